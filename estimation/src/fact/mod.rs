@@ -1,0 +1,11 @@
+//! Facts: immutable entries of gap-free logs, one log per (robot, boot). The estimate of the team is a
+//! pure function of the set of entries; see `docs/theory.md`.
+
+mod entry;
+mod fingerprint;
+
+pub use entry::{
+    Absolute, Answer, Body, Boot, ClockMap, Continuation, Entry, EntryId, Half, LogId, Noise, NoiseRef,
+    NominalState, Observation, Profile, Quantity, VoidReason,
+};
+pub use fingerprint::Fingerprint;

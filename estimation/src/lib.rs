@@ -1,0 +1,17 @@
+//! The estimator of Pleiad: geometry, motion, measurement models, and the fold of facts
+//! into a joint extended Kalman filter that no machine owns.
+//!
+//! Nothing here reads a clock, opens a file, spawns a task, knows a serialization format or logs.
+//! Time and randomness come in as arguments; the same facts give the same bits everywhere.
+//!
+//! Conventions are stated once in `docs/notation.md`: planar pose `map_from_robot`, tangent order
+//! `(x, y, yaw)`, SI units, right-invariant error `X = exp(xi) X_hat`.
+
+pub mod fact;
+pub mod geometry;
+pub mod identity;
+pub mod sample;
+pub mod symmetric;
+
+pub use geometry::Pose2;
+pub use identity::{BootIndex, LandmarkId, RobotId, Sequence, Timestamp};
