@@ -8,8 +8,14 @@
 //! `(x, y, yaw)`, SI units, right-invariant error `X = exp(xi) X_hat`.
 
 pub mod fact;
+pub mod fold;
 pub mod geometry;
 pub mod identity;
+pub mod joint;
+pub mod ledger;
+pub mod measurement;
+pub mod motion;
+pub mod nominal;
 pub mod sample;
 pub mod symmetric;
 

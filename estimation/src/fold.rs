@@ -1,0 +1,254 @@
+//! The fold: one fact at a time, in the order of their keys, into the joint state.
+
+use crate::fact::{Boot, EntryId, Fingerprint, Noise, NominalState, Quantity};
+use crate::geometry::{Matrix3, Vector2, Vector3};
+use crate::joint::{ErrorForm, Joint, Participant, Update};
+use crate::measurement::{self, Linearization, Unusable};
+use crate::{BootIndex, RobotId, Sequence, Timestamp};
+
+/// Raised whenever the same facts would give other bits.
+pub const FOLD_VERSION: u32 = 1;
+
+/// Gate on the normalized innovation squared by dimension: chi-square at 99.9 %.
+pub const DEFAULT_GATE: [f64; 3] = [10.828, 13.816, 16.266];
+
+/// All that decides the bits of an estimate besides the facts. A team must agree on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoldConfig {
+    /// Coordinates of the error.
+    pub form: ErrorForm,
+    /// Gate by dimension of the measurement, 1 to 3; infinite to accept everything.
+    pub gate: [f64; 3],
+}
+
+impl Default for FoldConfig {
+    fn default() -> Self {
+        Self { form: ErrorForm::Invariant, gate: DEFAULT_GATE }
+    }
+}
+
+impl FoldConfig {
+    /// Hash of the configuration and the version of the fold. Robots whose hashes differ cannot share a
+    /// ledger.
+    pub fn hash(&self) -> u64 {
+        let form = match self.form {
+            ErrorForm::Invariant => 0,
+            ErrorForm::Additive => 1,
+        };
+        let words = [u64::from(FOLD_VERSION), form].into_iter().chain(self.gate.map(f64::to_bits));
+        let Fingerprint(bytes) = Fingerprint::of_words(words);
+        bytes[..8].iter().fold(0, |hash, byte| hash << 8 | u64::from(*byte))
+    }
+}
+
+/// Where a fact stands in the order of the fold: by time, boots before observations of equal time, then
+/// by robot, boot and sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FactKey {
+    /// When.
+    pub time: Timestamp,
+    rank: u8,
+    /// The entry that carries the fact.
+    pub id: EntryId,
+}
+
+impl FactKey {
+    /// Key of a boot.
+    pub fn boot(time: Timestamp, id: EntryId) -> Self {
+        Self { time, rank: 0, id }
+    }
+
+    /// Key of an observation.
+    pub fn observation(time: Timestamp, id: EntryId) -> Self {
+        Self { time, rank: 1, id }
+    }
+
+    /// The last key that a fact of `time` or earlier can have.
+    pub fn last_at(time: Timestamp) -> Self {
+        let id =
+            EntryId { robot: RobotId(u32::MAX), boot: BootIndex(u32::MAX), sequence: Sequence(u64::MAX) };
+        Self { time, rank: u8::MAX, id }
+    }
+}
+
+/// A complete fact, ready to be folded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fact {
+    /// A robot's boot begins.
+    Boot(Boot),
+    /// A robot observed something; with the other half if it was a robot.
+    Observation {
+        /// What was observed.
+        quantity: Quantity,
+        /// How well; `None` if the log never declared the profile referred to.
+        noise: Option<Noise>,
+        /// The observer's nominal state.
+        observer: NominalState,
+        /// The state of the robot that was seen, and the boot it belongs to.
+        other: Option<(BootIndex, NominalState)>,
+    },
+}
+
+/// Why a fact was not folded though complete.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SkipReason {
+    /// A participant has no place in the map yet.
+    NotPlaced(RobotId),
+    /// A participant's state belongs to a boot that has ended or has not begun.
+    OtherBoot(RobotId),
+    /// The target is predicted closer than a millimetre.
+    TooClose,
+    /// A full pose of a landmark: a point has no heading.
+    PointHasNoHeading,
+    /// The noise profile is not declared, has the wrong dimension, or is not positive definite.
+    Noise,
+    /// A robot observed itself.
+    Itself,
+}
+
+/// What the fold did with a fact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outcome {
+    /// A boot took effect.
+    Booted,
+    /// A robot was placed in the map by its prior.
+    Placed,
+    /// The joint was updated.
+    Used,
+    /// The gate refused it.
+    Rejected {
+        /// The gate.
+        threshold: f64,
+    },
+    /// It could not be folded.
+    Skipped(SkipReason),
+}
+
+/// The record every fact leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Dimension of the measurement; 0 where there was none.
+    pub dimension: usize,
+    /// Measured minus predicted before the update; zero beyond the dimension.
+    pub innovation: Vector3,
+    /// Normalized innovation squared.
+    pub nis: f64,
+}
+
+impl Residual {
+    fn without_measurement(outcome: Outcome) -> Self {
+        Self { outcome, dimension: 0, innovation: Vector3::zeros(), nis: 0.0 }
+    }
+}
+
+/// Folds one fact into the joint state.
+pub fn fold(joint: &mut Joint, config: &FoldConfig, key: &FactKey, fact: &Fact) -> Residual {
+    match fact {
+        Fact::Boot(boot) => {
+            joint.boot(key.id.robot, key.id.boot, boot);
+            Residual::without_measurement(Outcome::Booted)
+        }
+        Fact::Observation { quantity, noise, observer, other } => {
+            let seen = other.as_ref();
+            fold_observation(joint, config, key, quantity, noise.as_ref(), observer, seen)
+                .unwrap_or_else(|reason| Residual::without_measurement(Outcome::Skipped(reason)))
+        }
+    }
+}
+
+fn fold_observation(
+    joint: &mut Joint,
+    config: &FoldConfig,
+    key: &FactKey,
+    quantity: &Quantity,
+    noise: Option<&Noise>,
+    observer: &NominalState,
+    other: Option<&(BootIndex, NominalState)>,
+) -> Result<Residual, SkipReason> {
+    let a = key.id.robot;
+    let dimension = dimension(quantity);
+    let noise = noise.filter(|noise| usize::from(noise.dimension) == dimension).ok_or(SkipReason::Noise)?;
+    let noise = measurement::noise_matrix(noise);
+    if let Quantity::Absolute(crate::fact::Absolute::Pose(z)) = quantity
+        && joint.index(a).is_none()
+    {
+        joint.place(a, key.id.boot, z, &noise, observer);
+        return Ok(Residual::without_measurement(Outcome::Placed));
+    }
+    let a_index = participant(joint, a, key.id.boot)?;
+    let mut participants = Vec::with_capacity(2);
+    let linearization: Result<Linearization, Unusable> = match quantity {
+        Quantity::Robot { robot: b, relative } => {
+            if *b == a {
+                return Err(SkipReason::Itself);
+            }
+            let (boot, state) = other.ok_or(SkipReason::NotPlaced(*b))?;
+            let b_index = participant(joint, *b, *boot)?;
+            joint.propagate(a_index, observer);
+            joint.propagate(b_index, state);
+            let (xa, xb) = (pose(joint, a, observer), pose(joint, *b, state));
+            measurement::of_robot(relative, &xa, &xb).inspect(|at| {
+                participants.push(Participant { index: a_index, jacobian: -at.jacobian });
+                participants.push(Participant { index: b_index, jacobian: at.jacobian });
+            })
+        }
+        Quantity::Landmark { position_m: [x, y], relative, .. } => {
+            joint.propagate(a_index, observer);
+            measurement::of_point(relative, &pose(joint, a, observer), Vector2::new(*x, *y)).inspect(|at| {
+                participants.push(Participant { index: a_index, jacobian: -at.jacobian });
+            })
+        }
+        Quantity::Absolute(absolute) => {
+            joint.propagate(a_index, observer);
+            let at = measurement::of_map(absolute, &pose(joint, a, observer));
+            participants.push(Participant { index: a_index, jacobian: at.jacobian });
+            Ok(at)
+        }
+    };
+    let at = linearization.map_err(|unusable| match unusable {
+        Unusable::TooClose { .. } => SkipReason::TooClose,
+        Unusable::PointHasNoHeading => SkipReason::PointHasNoHeading,
+    })?;
+    update(joint, config, &at, &noise, &mut participants)
+}
+
+fn update(
+    joint: &mut Joint,
+    config: &FoldConfig,
+    at: &Linearization,
+    noise: &Matrix3,
+    participants: &mut [Participant],
+) -> Result<Residual, SkipReason> {
+    let threshold = config.gate[at.dimension - 1];
+    let (outcome, nis) = match joint.update(at.dimension, &at.innovation, noise, participants, threshold) {
+        Update::Used { nis } => (Outcome::Used, nis),
+        Update::Rejected { nis, threshold } => (Outcome::Rejected { threshold }, nis),
+        Update::Indefinite => return Err(SkipReason::Noise),
+    };
+    Ok(Residual { outcome, dimension: at.dimension, innovation: at.innovation, nis })
+}
+
+fn dimension(quantity: &Quantity) -> usize {
+    match quantity {
+        Quantity::Robot { relative, .. } | Quantity::Landmark { relative, .. } => {
+            measurement::dimension(relative)
+        }
+        Quantity::Absolute(absolute) => measurement::absolute_dimension(absolute),
+    }
+}
+
+fn participant(joint: &Joint, robot: RobotId, boot: BootIndex) -> Result<usize, SkipReason> {
+    let index = joint.index(robot).ok_or(SkipReason::NotPlaced(robot))?;
+    match joint.member(robot) {
+        Some(member) if member.boot == boot => Ok(index),
+        _ => Err(SkipReason::OtherBoot(robot)),
+    }
+}
+
+fn pose(joint: &Joint, robot: RobotId, state: &NominalState) -> crate::Pose2 {
+    joint
+        .member(robot)
+        .map_or_else(crate::Pose2::identity, |member| member.correction.compose(&state.nominal))
+}

@@ -1,0 +1,283 @@
+//! The joint state of the team: a correction per robot and one covariance over all of them.
+
+mod covariance;
+
+pub use covariance::JointCovariance;
+
+use crate::fact::{Boot, Continuation, NominalState};
+use crate::geometry::{Matrix3, Vector3};
+use crate::symmetric::Symmetric3;
+use crate::{BootIndex, Pose2, RobotId};
+
+/// In which coordinates the error of a pose is Gaussian.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ErrorForm {
+    /// `X = exp(xi) X_hat`: the error stays put while the robot moves, and an error common to the team
+    /// is never seen by a relative measurement.
+    #[default]
+    Invariant,
+    /// The textbook filter: errors of position and yaw add to the estimate.
+    Additive,
+}
+
+/// One robot's part of the joint state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Member {
+    /// Who.
+    pub robot: RobotId,
+    /// On the trajectory of which boot.
+    pub boot: BootIndex,
+    /// `G`: the estimate at any time is `G N(t)`.
+    pub correction: Pose2,
+    /// The robot's nominal pose at its last event: there the additive form is linearized.
+    pub nominal: Pose2,
+    /// The noise sum already folded into the covariance.
+    pub folded_noise: Symmetric3,
+    placed: bool,
+}
+
+/// A robot taking part in an update: its index and the derivative of the prediction with respect to its
+/// invariant error.
+pub(crate) struct Participant {
+    pub index: usize,
+    pub jacobian: Matrix3,
+}
+
+/// What an update did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Update {
+    /// The whole joint was updated.
+    Used {
+        /// Normalized innovation squared.
+        nis: f64,
+    },
+    /// The innovation failed the gate; nothing but process noise entered.
+    Rejected {
+        /// Normalized innovation squared.
+        nis: f64,
+        /// The gate.
+        threshold: f64,
+    },
+    /// The innovation covariance is not positive definite: the noise given was not.
+    Indefinite,
+}
+
+/// The team as a joint filter sees it after some prefix of the facts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    form: ErrorForm,
+    members: Vec<Member>,
+    covariance: JointCovariance,
+}
+
+impl Joint {
+    /// No robot yet.
+    pub fn new(form: ErrorForm) -> Self {
+        Self { form, members: Vec::new(), covariance: JointCovariance::default() }
+    }
+
+    /// The robots that have a place in the map, in the order of their rows in the covariance.
+    pub fn members(&self) -> impl Iterator<Item = &Member> {
+        self.members.iter().filter(|member| member.placed)
+    }
+
+    /// A robot that has a place in the map.
+    pub fn member(&self, robot: RobotId) -> Option<&Member> {
+        self.index(robot).map(|index| &self.members[index])
+    }
+
+    /// The covariance over all robots, in the coordinates of the error form; rows in the order in which
+    /// the robots were first placed. Rows of a robot without a place are zero.
+    pub fn covariance(&self) -> &JointCovariance {
+        &self.covariance
+    }
+
+    /// Row block of a robot in [`Joint::covariance`].
+    pub fn index(&self, robot: RobotId) -> Option<usize> {
+        self.members.iter().position(|member| member.robot == robot && member.placed)
+    }
+
+    /// Estimate and covariance of one robot at `state` of its nominal trajectory. The covariance is of
+    /// the additive error (position in the map, yaw): what is published.
+    pub fn estimate(&self, robot: RobotId, state: &NominalState) -> Option<(Pose2, Symmetric3)> {
+        let index = self.index(robot)?;
+        let member = &self.members[index];
+        let block = self.covariance.block(index, index);
+        Some(extrapolate(self.form, &member.correction, &member.nominal, member.folded_noise, &block, state))
+    }
+
+    /// Places a robot: `G = z N^-1`, its block from the noise of `z` in the body frame, no cross terms.
+    pub(crate) fn place(
+        &mut self,
+        robot: RobotId,
+        boot: BootIndex,
+        z: &Pose2,
+        noise: &Matrix3,
+        at: &NominalState,
+    ) {
+        let member = Member {
+            robot,
+            boot,
+            correction: z.compose(&at.nominal.inverse()),
+            nominal: at.nominal,
+            folded_noise: at.noise_sum,
+            placed: true,
+        };
+        let index = if let Some(index) = self.members.iter().position(|known| known.robot == robot) {
+            self.members[index] = member;
+            self.covariance.clear(index);
+            index
+        } else {
+            self.members.push(member);
+            self.covariance.grow();
+            self.members.len() - 1
+        };
+        let adjoint = z.adjoint();
+        let mut block = adjoint * noise * adjoint.transpose();
+        if self.form == ErrorForm::Additive {
+            let m = z.additive_from_invariant();
+            block = m * block * m.transpose();
+        }
+        self.covariance.set_diagonal(index, Symmetric3::from_lower(&block));
+    }
+
+    /// A boot begins: a continued one carries the robot's block on, a lost one ends it.
+    pub(crate) fn boot(&mut self, robot: RobotId, index: BootIndex, boot: &Boot) {
+        let Some(row) = self.index(robot) else { return };
+        match &boot.continuation {
+            Some(continuation) if continuation.previous == self.members[row].boot => {
+                self.carry_on(row, index, boot, continuation);
+            }
+            _ => {
+                self.members[row].placed = false;
+                self.covariance.clear(row);
+            }
+        }
+    }
+
+    /// `S = N_new(t0) N_old(t1)^-1`, `G <- G S^-1`, and the noise not yet folded is carried into the new
+    /// frame; then the unseen motion of the gap. Cross terms stay (`docs/theory.md`, boots).
+    fn carry_on(&mut self, row: usize, index: BootIndex, boot: &Boot, continuation: &Continuation) {
+        let s = boot.nominal.compose(&continuation.last.nominal.inverse());
+        let member = &mut self.members[row];
+        let unfolded = continuation.last.noise_sum.minus(member.folded_noise);
+        // The additive form is linearized at the last event; that pose is the same in the new frame.
+        member.nominal = s.compose(&member.nominal);
+        member.correction = member.correction.compose(&s.inverse());
+        member.folded_noise = unfolded.congruence(&s.adjoint()).scaled(-1.0);
+        member.boot = index;
+        let gap_adjoint = boot.nominal.adjoint();
+        let state = NominalState {
+            nominal: boot.nominal,
+            // The gap is motion noise like any other, in the frame of the nominal trajectory.
+            noise_sum: continuation.gap.congruence(&gap_adjoint),
+        };
+        self.propagate(row, &state);
+        self.members[row].folded_noise = Symmetric3::zero();
+    }
+
+    /// Folds the process noise a robot has accumulated since its last event.
+    pub(crate) fn propagate(&mut self, index: usize, state: &NominalState) {
+        let member = &mut self.members[index];
+        let mut added = state.noise_sum.minus(member.folded_noise).congruence(&member.correction.adjoint());
+        if self.form == ErrorForm::Additive {
+            let pose = member.correction.compose(&state.nominal);
+            let last = member.correction.compose(&member.nominal);
+            self.covariance.transform(index, &additive_transition(&last, &pose));
+            added = added.congruence(&pose.additive_from_invariant());
+        }
+        member.folded_noise = state.noise_sum;
+        member.nominal = state.nominal;
+        self.covariance.add_diagonal(index, added);
+    }
+
+    /// One update of the whole joint with an innovation of `dimension` and the given noise, if it passes
+    /// the gate.
+    pub(crate) fn update(
+        &mut self,
+        dimension: usize,
+        innovation: &Vector3,
+        noise: &Matrix3,
+        participants: &mut [Participant],
+        threshold: f64,
+    ) -> Update {
+        if self.form == ErrorForm::Additive {
+            for participant in participants.iter_mut() {
+                let member = &self.members[participant.index];
+                let pose = member.correction.compose(&member.nominal);
+                participant.jacobian *= pose.invariant_from_additive();
+            }
+        }
+        let Some(prepared) = self.covariance.prepare(dimension, innovation, noise, participants) else {
+            return Update::Indefinite;
+        };
+        let nis = prepared.nis();
+        if nis > threshold {
+            return Update::Rejected { nis, threshold };
+        }
+        self.covariance.downdate(&prepared);
+        for (index, member) in self.members.iter_mut().enumerate().filter(|(_, member)| member.placed) {
+            let delta = prepared.correction(index);
+            match self.form {
+                ErrorForm::Invariant => {
+                    member.correction = Pose2::exp(delta).compose(&member.correction);
+                }
+                ErrorForm::Additive => {
+                    let pose = member.correction.compose(&member.nominal);
+                    let moved =
+                        Pose2::new(pose.x_m() + delta.x, pose.y_m() + delta.y, pose.yaw_rad() + delta.z);
+                    member.correction = moved.compose(&member.nominal.inverse());
+                }
+            }
+        }
+        Update::Used { nis }
+    }
+
+    /// The bits of the estimate, for comparing two of them: robots, corrections, covariance.
+    pub(crate) fn words(&self) -> impl Iterator<Item = u64> + '_ {
+        let members = self.members.iter().flat_map(|member| {
+            let g = &member.correction;
+            [
+                u64::from(member.robot.0),
+                u64::from(member.boot.0),
+                u64::from(member.placed),
+                g.x_m().to_bits(),
+                g.y_m().to_bits(),
+                g.yaw_rad().to_bits(),
+            ]
+            .into_iter()
+            .chain(member.folded_noise.0.into_iter().map(f64::to_bits))
+        });
+        members.chain(self.covariance.lower().iter().map(|entry| entry.to_bits()))
+    }
+}
+
+/// A robot's estimate at `state` of its nominal trajectory, and the covariance of position and yaw, from
+/// what the joint holds of it as of its last event.
+pub(crate) fn extrapolate(
+    form: ErrorForm,
+    correction: &Pose2,
+    last_nominal: &Pose2,
+    folded_noise: Symmetric3,
+    block: &Matrix3,
+    state: &NominalState,
+) -> (Pose2, Symmetric3) {
+    let pose = correction.compose(&state.nominal);
+    let grown = state.noise_sum.minus(folded_noise).congruence(&correction.adjoint());
+    let published = pose.additive_from_invariant();
+    let block = Symmetric3::from_lower(block);
+    let covariance = match form {
+        ErrorForm::Invariant => block.plus(grown).congruence(&published),
+        ErrorForm::Additive => {
+            let phi = additive_transition(&correction.compose(last_nominal), &pose);
+            block.congruence(&phi).plus(grown.congruence(&published))
+        }
+    };
+    (pose, covariance)
+}
+
+/// `[I, J (p_new - p_last)]`: the textbook transition from a robot's last event to `pose`.
+fn additive_transition(last: &Pose2, pose: &Pose2) -> Matrix3 {
+    let moved = pose.position() - last.position();
+    Matrix3::new(1.0, 0.0, -moved.y, 0.0, 1.0, moved.x, 0.0, 0.0, 1.0)
+}

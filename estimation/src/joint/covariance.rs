@@ -1,0 +1,243 @@
+//! The joint covariance: a packed lower triangle, and the one form of update it ever undergoes.
+//!
+//! Every loop is written out in a fixed order without reductions that a compiler or a run-time dispatch
+//! could reorder: the same numbers come out of every processor.
+
+use super::Participant;
+use crate::geometry::{Matrix3, Vector3};
+use crate::symmetric::Symmetric3;
+
+/// A symmetric positive semidefinite matrix of 3x3 blocks, lower triangle by rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointCovariance {
+    size: usize,
+    lower: Vec<f64>,
+}
+
+/// An update made ready: `V = P H^T L^-T` and `u = L^-1 r` with `S = L L^T`.
+pub(crate) struct Prepared {
+    dimension: usize,
+    // One column of V per row of the measurement, each as long as the state.
+    columns: [Vec<f64>; 3],
+    whitened: Vector3,
+}
+
+impl Prepared {
+    /// Normalized innovation squared, `|L^-1 r|^2`.
+    pub(crate) fn nis(&self) -> f64 {
+        let mut sum = 0.0;
+        for k in 0..self.dimension {
+            sum += self.whitened[k] * self.whitened[k];
+        }
+        sum
+    }
+
+    /// `K r` for one robot.
+    pub(crate) fn correction(&self, index: usize) -> Vector3 {
+        let mut delta = Vector3::zeros();
+        for k in 0..self.dimension {
+            for axis in 0..3 {
+                delta[axis] += self.columns[k][3 * index + axis] * self.whitened[k];
+            }
+        }
+        delta
+    }
+}
+
+impl JointCovariance {
+    /// Number of rows: three times the number of robots.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// The packed lower triangle, row after row.
+    pub fn lower(&self) -> &[f64] {
+        &self.lower
+    }
+
+    /// One entry.
+    pub fn entry(&self, row: usize, column: usize) -> f64 {
+        let (row, column) = if row >= column { (row, column) } else { (column, row) };
+        self.lower[row * (row + 1) / 2 + column]
+    }
+
+    /// The 3x3 block of robots `i` and `j`.
+    pub fn block(&self, i: usize, j: usize) -> Matrix3 {
+        Matrix3::from_fn(|row, column| self.entry(3 * i + row, 3 * j + column))
+    }
+
+    /// The whole matrix, row-major.
+    pub fn to_dense(&self) -> Vec<Vec<f64>> {
+        (0..self.size).map(|row| (0..self.size).map(|column| self.entry(row, column)).collect()).collect()
+    }
+
+    pub(super) fn grow(&mut self) {
+        self.size += 3;
+        self.lower.resize(self.size * (self.size + 1) / 2, 0.0);
+    }
+
+    /// Marginalizes a robot: its rows and columns become zero.
+    pub(super) fn clear(&mut self, index: usize) {
+        for row in 0..self.size {
+            for column in 0..=row {
+                if row / 3 == index || column / 3 == index {
+                    self.lower[row * (row + 1) / 2 + column] = 0.0;
+                }
+            }
+        }
+    }
+
+    pub(super) fn set_diagonal(&mut self, index: usize, block: Symmetric3) {
+        self.for_diagonal(index, |entry, value| *entry = value, block);
+    }
+
+    pub(super) fn add_diagonal(&mut self, index: usize, block: Symmetric3) {
+        self.for_diagonal(index, |entry, value| *entry += value, block);
+    }
+
+    fn for_diagonal(&mut self, index: usize, change: impl Fn(&mut f64, f64), block: Symmetric3) {
+        let mut values = block.0.into_iter();
+        for row in 3 * index..3 * index + 3 {
+            for column in 3 * index..=row {
+                if let Some(value) = values.next() {
+                    change(&mut self.lower[row * (row + 1) / 2 + column], value);
+                }
+            }
+        }
+    }
+
+    /// `P_ii <- F P_ii F^T`, `P_ij <- F P_ij` for one robot.
+    pub(super) fn transform(&mut self, index: usize, f: &Matrix3) {
+        for other in (0..self.size / 3).filter(|other| *other != index) {
+            let block = f * self.block(index, other);
+            for row in 0..3 {
+                for column in 0..3 {
+                    let (i, j) = (3 * index + row, 3 * other + column);
+                    let (i, j) = if i >= j { (i, j) } else { (j, i) };
+                    self.lower[i * (i + 1) / 2 + j] = block[(row, column)];
+                }
+            }
+        }
+        let own = Symmetric3::from_lower(&self.block(index, index)).congruence(f);
+        self.set_diagonal(index, own);
+    }
+
+    /// Prepares an update; `None` if the innovation covariance is not positive definite.
+    pub(super) fn prepare(
+        &self,
+        dimension: usize,
+        innovation: &Vector3,
+        noise: &Matrix3,
+        participants: &[Participant],
+    ) -> Option<Prepared> {
+        let mut columns: [Vec<f64>; 3] = Default::default();
+        for (k, column) in columns.iter_mut().enumerate().take(dimension) {
+            *column = vec![0.0; self.size];
+            for Participant { index, jacobian } in participants {
+                for axis in 0..3 {
+                    self.accumulate_column(3 * index + axis, jacobian[(k, axis)], column);
+                }
+            }
+        }
+        // S = H P H^T + R from the participants' rows of P H^T, its lower triangle only.
+        let mut s = Matrix3::zeros();
+        for row in 0..dimension {
+            for column in 0..=row {
+                let mut sum = noise[(row, column)];
+                for Participant { index, jacobian } in participants {
+                    for axis in 0..3 {
+                        sum += jacobian[(row, axis)] * columns[column][3 * index + axis];
+                    }
+                }
+                s[(row, column)] = sum;
+            }
+        }
+        let l = cholesky(dimension, &s)?;
+        for row in 0..dimension {
+            let (done, rest) = columns.split_at_mut(row);
+            let column = &mut rest[0];
+            for (k, earlier) in done.iter().enumerate() {
+                let factor = l[(row, k)];
+                for (entry, other) in column.iter_mut().zip(earlier) {
+                    *entry -= factor * other;
+                }
+            }
+            let pivot = l[(row, row)];
+            for entry in column.iter_mut() {
+                *entry /= pivot;
+            }
+        }
+        let mut whitened = Vector3::zeros();
+        for row in 0..dimension {
+            let mut sum = innovation[row];
+            for k in 0..row {
+                sum -= l[(row, k)] * whitened[k];
+            }
+            whitened[row] = sum / l[(row, row)];
+        }
+        Some(Prepared { dimension, columns, whitened })
+    }
+
+    /// `column += factor * P[:, j]`.
+    fn accumulate_column(&self, j: usize, factor: f64, column: &mut [f64]) {
+        let row_start = j * (j + 1) / 2;
+        for (entry, value) in column.iter_mut().zip(&self.lower[row_start..=row_start + j]) {
+            *entry += factor * value;
+        }
+        for (row, entry) in column.iter_mut().enumerate().skip(j + 1) {
+            *entry += factor * self.lower[row * (row + 1) / 2 + j];
+        }
+    }
+
+    /// `P <- P - V V^T`, lower triangle, row by row.
+    pub(super) fn downdate(&mut self, prepared: &Prepared) {
+        let [a, b, c] = &prepared.columns;
+        let mut start = 0;
+        for row in 0..self.size {
+            let entries = &mut self.lower[start..=start + row];
+            start += row + 1;
+            match prepared.dimension {
+                1 => {
+                    let ar = a[row];
+                    for (entry, x) in entries.iter_mut().zip(a) {
+                        *entry -= ar * x;
+                    }
+                }
+                2 => {
+                    let (ar, br) = (a[row], b[row]);
+                    for ((entry, x), y) in entries.iter_mut().zip(a).zip(b) {
+                        *entry = *entry - ar * x - br * y;
+                    }
+                }
+                _ => {
+                    let (ar, br, cr) = (a[row], b[row], c[row]);
+                    for (((entry, x), y), z) in entries.iter_mut().zip(a).zip(b).zip(c) {
+                        *entry = *entry - ar * x - br * y - cr * z;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Lower Cholesky factor of the leading `dimension` rows of a symmetric matrix given by its lower triangle.
+fn cholesky(dimension: usize, s: &Matrix3) -> Option<Matrix3> {
+    let mut l = Matrix3::zeros();
+    for row in 0..dimension {
+        for column in 0..=row {
+            let mut sum = s[(row, column)];
+            for k in 0..column {
+                sum -= l[(row, k)] * l[(column, k)];
+            }
+            if row == column {
+                if !(sum > 0.0 && sum.is_finite()) {
+                    return None;
+                }
+                l[(row, row)] = sum.sqrt();
+            } else {
+                l[(row, column)] = sum / l[(column, column)];
+            }
+        }
+    }
+    Some(l)
+}

@@ -1,0 +1,482 @@
+//! The ledger: all logs a robot holds, the facts they complete, and the fold kept up to date.
+//!
+//! The estimate is a function of the set of entries in gap-free prefixes: the order of arrival,
+//! duplicates and batches leave no trace in it.
+
+mod log;
+mod snapshots;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+pub use log::{Log, LogDigest};
+use snapshots::Snapshots;
+
+use crate::fact::{
+    Absolute, Answer, Body, Entry, EntryId, Fingerprint, LogId, Noise, NoiseRef, NominalState, Observation,
+    Quantity, VoidReason,
+};
+use crate::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, fold};
+use crate::geometry::Matrix3;
+use crate::joint::Joint;
+use crate::{BootIndex, Pose2, RobotId, Timestamp};
+
+/// A fact in the order of the fold, and what became of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FactRecord {
+    /// The complete fact.
+    pub fact: Fact,
+    /// What the last fold did with it; `None` until then. Provisional while earlier facts can arrive.
+    pub residual: Option<Residual>,
+}
+
+/// What became of an entry handed in.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Insertion {
+    /// It extended its log (together with `released` later ones that had waited for it).
+    Added {
+        /// Buffered entries that became part of the prefix.
+        released: usize,
+    },
+    /// It was held already.
+    Duplicate,
+    /// Entries before it are missing; it waits for them.
+    Waiting,
+    /// It can never be used.
+    Refused(Refusal),
+    /// Another entry with the same identity is held. The one with the smaller fingerprint stays, and the
+    /// robot is quarantined: nothing more is taken from it.
+    Equivocation,
+}
+
+/// Why an entry can never be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// A log must begin with a boot entry, and has only one.
+    #[error("a boot entry belongs at sequence 0 of a log, and nowhere else")]
+    MisplacedBoot,
+    /// The log was written under another configuration of the filter.
+    #[error(
+        "the log was written under another filter configuration; give all robots the same [filter] section"
+    )]
+    Configuration,
+    /// The robot has contradicted itself before.
+    #[error("the robot is quarantined: it published two different entries under one identity")]
+    Quarantined,
+    /// Too many entries wait for a missing one; it will be asked for again.
+    #[error("too far ahead of the first missing entry of its log")]
+    TooFarAhead,
+}
+
+/// Counts of facts by what became of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FactCounts {
+    /// Complete observations of robots by robots.
+    pub relative: usize,
+    /// Observations against the map: GPS, heading, landmarks, poses.
+    pub absolute: usize,
+    /// Updated the joint.
+    pub used: usize,
+    /// Refused by the gate.
+    pub rejected: usize,
+    /// Complete, but could not be folded.
+    pub skipped: usize,
+    /// Wait for their other half.
+    pub pending: usize,
+    /// Answered with a reason why there is no other half.
+    pub void: usize,
+}
+
+/// A robot's part of the joint after one fact: a point of its settled history.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettledPoint {
+    /// Time of the fact.
+    pub time: Timestamp,
+    /// On the trajectory of which boot the correction applies.
+    pub boot: BootIndex,
+    /// A copy of the joint's view of the robot, enough to give its estimate until the next fact.
+    view: SettledView,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct SettledView {
+    correction: Pose2,
+    block: Matrix3,
+    folded_noise: crate::symmetric::Symmetric3,
+    nominal: Pose2,
+    form: crate::joint::ErrorForm,
+}
+
+/// All that is known, and the estimate that follows from it.
+#[derive(Clone, Debug)]
+pub struct Ledger {
+    config: FoldConfig,
+    configuration: u64,
+    logs: BTreeMap<LogId, Log>,
+    quarantined: BTreeSet<RobotId>,
+    profiles: BTreeMap<(LogId, u16), Noise>,
+    /// Complete facts in the order of the fold.
+    facts: BTreeMap<FactKey, FactRecord>,
+    /// Observations of robots that have not answered yet.
+    pending: BTreeMap<EntryId, Observation>,
+    /// Answers by observation and answering robot, with the entry they stand in. Should a robot answer
+    /// twice (having lost its journal), the entry with the smaller identity counts, in whatever order the
+    /// two arrive.
+    answers: BTreeMap<(EntryId, RobotId), (EntryId, Answer)>,
+    void: BTreeMap<EntryId, VoidReason>,
+    joint: Joint,
+    /// The last fact in `joint`.
+    folded: Option<FactKey>,
+    /// The earliest fact that has arrived since and belongs before `folded`.
+    dirty: Option<FactKey>,
+    snapshots: Snapshots,
+    refolded: u64,
+}
+
+impl Ledger {
+    /// Empty.
+    pub fn new(config: FoldConfig) -> Self {
+        Self {
+            config,
+            configuration: config.hash(),
+            logs: BTreeMap::new(),
+            quarantined: BTreeSet::new(),
+            profiles: BTreeMap::new(),
+            facts: BTreeMap::new(),
+            pending: BTreeMap::new(),
+            answers: BTreeMap::new(),
+            void: BTreeMap::new(),
+            joint: Joint::new(config.form),
+            folded: None,
+            dirty: None,
+            snapshots: Snapshots::default(),
+            refolded: 0,
+        }
+    }
+
+    /// Hash of the configuration that decides the bits of the estimate.
+    pub fn configuration(&self) -> u64 {
+        self.configuration
+    }
+
+    /// Takes an entry, from whomever it came. The estimate follows at the next [`Ledger::settle`].
+    pub fn insert(&mut self, entry: Entry) -> Insertion {
+        let id = entry.id;
+        let fingerprint = Fingerprint::of(&entry);
+        let log = self.logs.entry(id.log()).or_default();
+        if let Some(held) = log.fingerprint(id.sequence) {
+            if held == fingerprint {
+                return Insertion::Duplicate;
+            }
+            self.equivocation(&entry, fingerprint < held);
+            return Insertion::Equivocation;
+        }
+        let refusal = if self.quarantined.contains(&id.robot) {
+            Some(Refusal::Quarantined)
+        } else {
+            self.refusal(&entry)
+        };
+        if let Some(refusal) = refusal {
+            self.forget_if_empty(id.log());
+            return Insertion::Refused(refusal);
+        }
+        let log = self.logs.entry(id.log()).or_default();
+        if id.sequence.0 != log.held() {
+            let fits = log.buffer(entry, fingerprint);
+            return if fits { Insertion::Waiting } else { Insertion::Refused(Refusal::TooFarAhead) };
+        }
+        let mut ready = vec![(entry, fingerprint)];
+        let mut released = 0;
+        while let Some((entry, fingerprint)) = ready.pop() {
+            let log = self.logs.entry(id.log()).or_default();
+            log.push(entry.clone(), fingerprint);
+            let next = log.take_buffered();
+            self.admit(&entry);
+            // A buffered entry was checked when it came, except for what the prefix decides.
+            if let Some((next, fingerprint)) = next
+                && self.refusal(&next).is_none()
+            {
+                released += 1;
+                ready.push((next, fingerprint));
+            }
+        }
+        Insertion::Added { released }
+    }
+
+    fn forget_if_empty(&mut self, log: LogId) {
+        if self.logs.get(&log).is_some_and(Log::is_empty) {
+            self.logs.remove(&log);
+        }
+    }
+
+    fn refusal(&self, entry: &Entry) -> Option<Refusal> {
+        match &entry.body {
+            Body::Boot(boot) if entry.id.sequence.0 == 0 => {
+                (boot.configuration != self.configuration).then_some(Refusal::Configuration)
+            }
+            Body::Boot(_) => Some(Refusal::MisplacedBoot),
+            _ if entry.id.sequence.0 == 0 => Some(Refusal::MisplacedBoot),
+            _ => None,
+        }
+    }
+
+    /// A fork: rebuilt from the entries that stay, which is rare enough to be done the plain way.
+    fn equivocation(&mut self, other: &Entry, replaces: bool) {
+        let robot = other.id.robot;
+        if replaces {
+            let mut rebuilt = Self::new(self.config);
+            rebuilt.quarantined.clone_from(&self.quarantined);
+            rebuilt.quarantined.remove(&robot);
+            for entry in self.logs.values().flat_map(Log::entries) {
+                rebuilt.insert(if entry.id == other.id { other.clone() } else { entry.clone() });
+            }
+            rebuilt.quarantined.clone_from(&self.quarantined);
+            *self = rebuilt;
+        }
+        self.quarantined.insert(robot);
+    }
+
+    /// Files an entry that has become part of a prefix.
+    fn admit(&mut self, entry: &Entry) {
+        let id = entry.id;
+        match &entry.body {
+            Body::Boot(boot) => self.file(FactKey::boot(boot.time, id), &Fact::Boot(*boot)),
+            Body::Profile(profile) => {
+                self.profiles.entry((id.log(), profile.index)).or_insert(profile.noise);
+            }
+            Body::ClockMap(_) => {}
+            Body::Observation(observation) => {
+                if let Quantity::Robot { robot, .. } = observation.quantity {
+                    self.pending.insert(id, *observation);
+                    self.resolve(id, observation, robot);
+                } else {
+                    self.complete(id, observation, None);
+                }
+            }
+            Body::Half(half) => {
+                let slot = self.answers.entry((half.observation, id.robot)).or_insert((id, half.answer));
+                if id < slot.0 {
+                    *slot = (id, half.answer);
+                } else if id > slot.0 {
+                    return;
+                }
+                // Only the robot that was seen can answer.
+                if let Some(observation) = self.observation(half.observation)
+                    && Self::names(&observation, id.robot)
+                {
+                    self.resolve(half.observation, &observation, id.robot);
+                }
+            }
+        }
+    }
+
+    fn observation(&self, id: EntryId) -> Option<Observation> {
+        match self.logs.get(&id.log())?.entries_from(id.sequence.0).first()?.body {
+            Body::Observation(observation) => Some(observation),
+            _ => None,
+        }
+    }
+
+    fn names(observation: &Observation, robot: RobotId) -> bool {
+        matches!(observation.quantity, Quantity::Robot { robot: named, .. } if named == robot)
+    }
+
+    /// Files an observation of `robot` by the answer held, if any; a former answer's traces go.
+    fn resolve(&mut self, id: EntryId, observation: &Observation, robot: RobotId) {
+        let Some((_, answer)) = self.answers.get(&(id, robot)).copied() else { return };
+        self.pending.remove(&id);
+        self.void.remove(&id);
+        match answer {
+            Answer::State { boot, state } => self.complete(id, observation, Some((boot, state))),
+            Answer::Void(reason) => {
+                let key = FactKey::observation(observation.time, id);
+                if self.facts.remove(&key).is_some() {
+                    self.touch(key);
+                }
+                self.void.insert(id, reason);
+            }
+        }
+    }
+
+    fn complete(&mut self, id: EntryId, observation: &Observation, other: Option<(BootIndex, NominalState)>) {
+        let noise = match observation.noise {
+            NoiseRef::Explicit(noise) => Some(noise),
+            NoiseRef::Profile(index) => self.profiles.get(&(id.log(), index)).copied(),
+        };
+        let fact = Fact::Observation {
+            quantity: observation.quantity,
+            noise,
+            observer: observation.observer,
+            other,
+        };
+        self.file(FactKey::observation(observation.time, id), &fact);
+    }
+
+    fn file(&mut self, key: FactKey, fact: &Fact) {
+        self.facts.insert(key, FactRecord { fact: *fact, residual: None });
+        self.touch(key);
+    }
+
+    /// Something changed at `key`: what was folded from there on is stale.
+    fn touch(&mut self, key: FactKey) {
+        if self.folded.is_some_and(|folded| key <= folded) && self.dirty.is_none_or(|dirty| key < dirty) {
+            self.dirty = Some(key);
+        }
+    }
+
+    /// Brings the estimate up to date with all facts held: goes back to the last snapshot before the
+    /// earliest new fact and folds from there.
+    pub fn settle(&mut self) -> &Joint {
+        if let Some(dirty) = self.dirty.take() {
+            let (joint, key) = self.snapshots.rewind(dirty, self.config.form);
+            self.joint = joint;
+            self.folded = key;
+        }
+        let after = self.folded.map_or(std::ops::Bound::Unbounded, std::ops::Bound::Excluded);
+        for (key, record) in self.facts.range_mut((after, std::ops::Bound::Unbounded)) {
+            record.residual = Some(fold(&mut self.joint, &self.config, key, &record.fact));
+            self.folded = Some(*key);
+            self.refolded += 1;
+            self.snapshots.offer(*key, &self.joint);
+        }
+        &self.joint
+    }
+
+    /// The estimate as of the last [`Ledger::settle`].
+    pub fn joint(&self) -> &Joint {
+        &self.joint
+    }
+
+    /// How many folds of single facts were done, repeated ones counted again: the price of late facts.
+    pub fn folds(&self) -> u64 {
+        self.refolded
+    }
+
+    /// The logs held, with how far and the hash of the prefix.
+    pub fn digests(&self) -> impl Iterator<Item = LogDigest> + '_ {
+        self.logs.iter().map(|(id, log)| log.digest(*id))
+    }
+
+    /// The entries of a log from sequence `from` on.
+    pub fn entries(&self, log: LogId, from: u64) -> &[Entry] {
+        self.logs.get(&log).map_or(&[], |log| log.entries_from(from))
+    }
+
+    /// A log, if anything of it is held.
+    pub fn log(&self, log: LogId) -> Option<&Log> {
+        self.logs.get(&log)
+    }
+
+    /// Observations of `robot` that wait for its half, in the order of their identities.
+    pub fn unanswered(&self, robot: RobotId) -> impl Iterator<Item = (EntryId, Timestamp)> + '_ {
+        self.pending
+            .iter()
+            .filter(move |(_, observation)| Self::names(observation, robot))
+            .map(|(id, observation)| (*id, observation.time))
+    }
+
+    /// Observations that wait for their half, per robot that owes it.
+    pub fn pending_by_robot(&self) -> BTreeMap<RobotId, usize> {
+        let mut counts = BTreeMap::new();
+        for observation in self.pending.values() {
+            if let Quantity::Robot { robot, .. } = observation.quantity {
+                *counts.entry(robot).or_insert(0) += 1;
+            }
+        }
+        counts
+    }
+
+    /// Robots that published two different entries under one identity.
+    pub fn quarantined(&self) -> &BTreeSet<RobotId> {
+        &self.quarantined
+    }
+
+    /// The complete facts in the order of the fold. Their residuals are those of the last
+    /// [`Ledger::settle`].
+    pub fn facts(&self) -> impl Iterator<Item = (&FactKey, &FactRecord)> {
+        self.facts.iter()
+    }
+
+    /// Observations answered with a reason why they can never be used.
+    pub fn voids(&self) -> impl Iterator<Item = (&EntryId, &VoidReason)> {
+        self.void.iter()
+    }
+
+    /// Counts by what became of the facts at the last [`Ledger::settle`].
+    pub fn counts(&self) -> FactCounts {
+        let mut counts =
+            FactCounts { pending: self.pending.len(), void: self.void.len(), ..FactCounts::default() };
+        for record in self.facts.values() {
+            let Fact::Observation { quantity, .. } = &record.fact else { continue };
+            match quantity {
+                Quantity::Robot { .. } => counts.relative += 1,
+                Quantity::Landmark { .. }
+                | Quantity::Absolute(Absolute::Position(_) | Absolute::Heading(_)) => {
+                    counts.absolute += 1;
+                }
+                Quantity::Absolute(Absolute::Pose(_)) => {
+                    // A prior is not an observation of the run.
+                    if record.residual.is_some_and(|residual| residual.outcome == Outcome::Placed) {
+                        continue;
+                    }
+                    counts.absolute += 1;
+                }
+            }
+            match record.residual.map(|residual| residual.outcome) {
+                Some(Outcome::Used) => counts.used += 1,
+                Some(Outcome::Rejected { .. }) => counts.rejected += 1,
+                Some(Outcome::Skipped(_)) => counts.skipped += 1,
+                Some(Outcome::Booted | Outcome::Placed) | None => {}
+            }
+        }
+        counts
+    }
+
+    /// Hash of the bits of the estimate and of the prefixes it is a function of. Two robots with equal
+    /// fingerprints hold the same facts and believe the same.
+    pub fn fingerprint(&mut self) -> Fingerprint {
+        self.settle();
+        let prefixes = self
+            .logs
+            .iter()
+            .filter(|(_, log)| log.held() > 0)
+            .flat_map(|(id, log)| [u64::from(id.robot.0), u64::from(id.boot.0), log.held()]);
+        Fingerprint::of_words(prefixes.chain(self.joint.words()))
+    }
+
+    /// Folds all facts once more from the beginning and gives, for one robot, its part of the joint after
+    /// each: the *settled* history, in which the estimate at t rests on all facts up to t.
+    pub fn settled_history(&self, robot: RobotId) -> Vec<SettledPoint> {
+        let mut joint = Joint::new(self.config.form);
+        let mut points = Vec::new();
+        for (key, record) in &self.facts {
+            fold(&mut joint, &self.config, key, &record.fact);
+            let Some((member, index)) = joint.member(robot).zip(joint.index(robot)) else { continue };
+            let view = SettledView {
+                correction: member.correction,
+                block: joint.covariance().block(index, index),
+                folded_noise: member.folded_noise,
+                nominal: member.nominal,
+                form: self.config.form,
+            };
+            points.push(SettledPoint { time: key.time, boot: member.boot, view });
+        }
+        points
+    }
+}
+
+impl SettledPoint {
+    /// The estimate and its covariance (position in the map, yaw) at `state` of the nominal trajectory,
+    /// until the next fact.
+    pub fn estimate(&self, state: &NominalState) -> (Pose2, crate::symmetric::Symmetric3) {
+        let view = &self.view;
+        crate::joint::extrapolate(
+            view.form,
+            &view.correction,
+            &view.nominal,
+            view.folded_noise,
+            &view.block,
+            state,
+        )
+    }
+}

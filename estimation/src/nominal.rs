@@ -1,0 +1,168 @@
+//! The nominal trajectory `N(t)` of one boot and its accumulated process noise `C(t)`.
+
+use std::collections::VecDeque;
+
+use crate::fact::NominalState;
+use crate::motion::Step;
+use crate::symmetric::Symmetric3;
+use crate::{Pose2, Timestamp};
+
+/// Odometry integrated from the start of a boot, never corrected, with a history to look back into.
+#[derive(Clone, Debug)]
+pub struct NominalTrajectory {
+    ticks: VecDeque<Tick>,
+    horizon: usize,
+    start: Timestamp,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Tick {
+    time: Timestamp,
+    state: NominalState,
+}
+
+/// Why a trajectory has no state at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outside {
+    /// Before its start.
+    Before,
+    /// Within it, but no longer kept.
+    Forgotten,
+    /// After its last odometry: it may still come.
+    After,
+}
+
+impl NominalTrajectory {
+    /// Starts at `time` with `N = nominal` and `C = 0`, keeping the last `horizon` ticks (at least two).
+    pub fn new(time: Timestamp, nominal: Pose2, horizon: usize) -> Self {
+        let state = NominalState { nominal, noise_sum: Symmetric3::zero() };
+        Self { ticks: VecDeque::from([Tick { time, state }]), horizon: horizon.max(2), start: time }
+    }
+
+    /// The first instant of the trajectory.
+    pub fn start(&self) -> Timestamp {
+        self.start
+    }
+
+    /// The last odometry.
+    pub fn end(&self) -> (Timestamp, NominalState) {
+        // The deque is never empty: it is built with one tick and only the oldest of two or more is dropped.
+        let tick = self.ticks[self.ticks.len() - 1];
+        (tick.time, tick.state)
+    }
+
+    /// `N <- N exp(u)`, `C <- C + Ad_N Q Ad_N^T` with the adjoint at the pose after the step
+    /// (`docs/theory.md`, propagation).
+    pub fn extend(&mut self, step: &Step) {
+        let (_, last) = self.end();
+        let nominal = last.nominal.compose(&Pose2::exp(step.motion));
+        let added = step.covariance.congruence(&nominal.adjoint());
+        let state = NominalState { nominal, noise_sum: last.noise_sum.plus(added) };
+        self.ticks.push_back(Tick { time: step.to, state });
+        if self.ticks.len() > self.horizon {
+            self.ticks.pop_front();
+        }
+    }
+
+    /// The state at `time`: the pose interpolated on the group, the noise sum linearly.
+    ///
+    /// # Errors
+    /// [`Outside`] if the trajectory does not cover `time`.
+    pub fn at(&self, time: Timestamp) -> Result<NominalState, Outside> {
+        if time < self.start {
+            return Err(Outside::Before);
+        }
+        let after = self.ticks.partition_point(|tick| tick.time < time);
+        let Some(next) = self.ticks.get(after) else { return Err(Outside::After) };
+        if next.time == time {
+            return Ok(next.state);
+        }
+        if after == 0 {
+            return Err(Outside::Forgotten);
+        }
+        let last = self.ticks[after - 1];
+        let share = time.seconds_since(last.time) / next.time.seconds_since(last.time);
+        let motion = last.state.nominal.between(&next.state.nominal).log();
+        let nominal = last.state.nominal.compose(&Pose2::exp(motion * share));
+        let grown = next.state.noise_sum.minus(last.state.noise_sum).scaled(share);
+        Ok(NominalState { nominal, noise_sum: last.state.noise_sum.plus(grown) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Matrix3, Vector3};
+
+    fn arc(ticks: u32, speed: f64, rate: f64, covariance: Symmetric3) -> NominalTrajectory {
+        let mut trajectory = NominalTrajectory::new(Timestamp(0), Pose2::new(1.0, 2.0, 0.5), 10_000);
+        for k in 0..i64::from(ticks) {
+            let (from, to) = (Timestamp(k * 10_000_000), Timestamp((k + 1) * 10_000_000));
+            let motion = Vector3::new(speed * 0.01, 0.0, rate * 0.01);
+            trajectory.extend(&Step { from, to, motion, covariance });
+        }
+        trajectory
+    }
+
+    #[test]
+    fn constant_velocity_follows_the_circle() {
+        let trajectory = arc(1000, 0.8, 0.4, Symmetric3::zero());
+        let (time, end) = trajectory.end();
+        let (t, radius) = (time.seconds(), 0.8 / 0.4);
+        let x = 1.0 + radius * ((0.5 + 0.4 * t).sin() - 0.5f64.sin());
+        let y = 2.0 - radius * ((0.5 + 0.4 * t).cos() - 0.5f64.cos());
+        assert!((end.nominal.x_m() - x).abs() < 1e-10 && (end.nominal.y_m() - y).abs() < 1e-10);
+    }
+
+    #[test]
+    fn interpolation_lies_on_the_arc_and_stays_between_the_noise_sums() {
+        let trajectory = arc(100, 0.8, 0.4, Symmetric3::diagonal(1e-4, 1e-5, 1e-6));
+        let fine = arc(100, 0.8, 0.4, Symmetric3::zero());
+        let t = Timestamp(503_700_000);
+        let state = trajectory.at(t).unwrap();
+        let expected = fine.at(Timestamp(500_000_000)).unwrap().nominal.compose(&Pose2::exp(Vector3::new(
+            0.8 * 0.0037,
+            0.0,
+            0.4 * 0.0037,
+        )));
+        assert!((state.nominal.position() - expected.position()).norm() < 1e-13);
+        let (before, after) =
+            (trajectory.at(Timestamp(500_000_000)).unwrap(), trajectory.at(Timestamp(510_000_000)).unwrap());
+        assert!(state.noise_sum.minus(before.noise_sum).is_positive_semidefinite());
+        assert!(after.noise_sum.minus(state.noise_sum).is_positive_semidefinite());
+    }
+
+    #[test]
+    fn noise_sum_carried_to_the_body_is_the_covariance_of_the_unicycle() {
+        // Independent route: P <- F P F^T + Q in the body frame of the moving robot, F = Ad(exp(-u)).
+        let q = Symmetric3::diagonal(1e-4, 1e-6, 4e-5);
+        let trajectory = arc(300, 0.5, -0.7, q);
+        let f = Pose2::exp(Vector3::new(-0.005, 0.0, 0.007)).adjoint();
+        let mut body = Matrix3::zeros();
+        for _ in 0..300 {
+            body = f * body * f.transpose() + q.to_matrix();
+        }
+        let (_, end) = trajectory.end();
+        let map_to_body = end.nominal.inverse().adjoint();
+        let carried = end.noise_sum.congruence(&map_to_body).to_matrix();
+        assert!((carried - body).norm() < 1e-12 * body.norm().max(1.0));
+    }
+
+    #[test]
+    fn what_is_not_covered_is_said_apart() {
+        let mut trajectory = arc(100, 0.8, 0.4, Symmetric3::zero());
+        assert_eq!(trajectory.at(Timestamp(-1)), Err(Outside::Before));
+        assert_eq!(trajectory.at(Timestamp(1_000_000_001)), Err(Outside::After));
+        trajectory.horizon = 10;
+        let step = Step {
+            from: Timestamp(1_000_000_000),
+            to: Timestamp(1_010_000_000),
+            motion: Vector3::zeros(),
+            covariance: Symmetric3::zero(),
+        };
+        for _ in 0..200 {
+            trajectory.extend(&step);
+        }
+        assert_eq!(trajectory.at(Timestamp(5_000)), Err(Outside::Forgotten));
+    }
+}
