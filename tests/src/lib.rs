@@ -1,1 +1,3 @@
-//! Placeholder until its first module lands.
+//! Tests across crates and processes. What lives here is what they share.
+
+pub mod architecture;

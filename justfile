@@ -1,0 +1,46 @@
+# `just` lists the tasks. The checks themselves are in .ci/run, so that there is one list of them.
+
+# Where the recordings are.
+export PLEIAD_RECORDINGS := env("PLEIAD_RECORDINGS", justfile_directory() / "../shared/recordings")
+
+[private]
+default:
+    @just --list
+
+# Everything that must hold before a change is accepted; changes nothing.
+verify:
+    .ci/run --no-install
+
+# Formats, and applies what clippy can correct by itself.
+fix:
+    cargo clippy --workspace --all-targets --fix --allow-dirty --allow-staged
+    cargo fmt --all
+
+# All tests that need nothing beyond the repository.
+test:
+    cargo test --workspace
+
+# The demonstration: what relative observations can and cannot tell.
+demo *arguments:
+    cargo run -- demo {{ arguments }}
+
+# The tests on real and simulated recordings.
+recordings:
+    cargo test -p pleiad-recording --features recordings --test real
+    cargo test -p pleiad-tests --features recordings --test recordings
+
+# Consistency over many seeded runs; takes minutes.
+monte-carlo:
+    cargo test -p pleiad-tests --features slow --test monte_carlo
+
+# The documentation of the workspace's own crates, warnings denied.
+docs:
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+
+# Licences, sources, bans and advisories of the dependencies.
+deny:
+    cargo deny --all-features check
+
+# The same bits with and without fused multiply-add.
+golden:
+    .ci/golden-without-fma
