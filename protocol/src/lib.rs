@@ -1,1 +1,28 @@
-//! Placeholder until its first module lands.
+//! What travels between agents, and under which keys: messages, their bytes, and the checks between
+//! the two. Nothing here knows a transport or a file.
+//!
+//! A [`Message`] is encoded as a version byte, a kind byte and a body. Decoding trusts nothing: sizes are
+//! bounded, numbers finite and in range, covariances positive, trailing bytes refused; a refusal names
+//! the field and what was found. What has been decoded can be used without a further check of its form;
+//! whether it is *true* (who said it, whether it contradicts an earlier entry) is the ledger's business.
+
+mod codec;
+mod error;
+pub mod keys;
+pub mod limits;
+mod message;
+mod messages;
+#[cfg(any(test, feature = "testing"))]
+#[doc(hidden)]
+pub mod testing;
+mod wire;
+
+pub use error::{KeyError, ProtocolError};
+pub use keys::{Key, Kind, SensorKind, TeamName};
+pub use message::{Message, decode_entries, decode_sample, encode_entries, encode_sample};
+pub use messages::{
+    ControlReply, ControlRequest, Estimate, FactCounts, FactsRequest, LogRange, LogStatus, SampleCounts,
+    SensorAck, SensorBatch, Status,
+};
+// The names in keys and messages, for crates that must not know estimates.
+pub use pleiad_estimation::{RobotId, Timestamp};

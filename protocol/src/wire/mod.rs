@@ -1,0 +1,13 @@
+//! The shapes of the bytes: private mirrors of the domain types and the checks on the way back.
+
+mod check;
+pub mod control;
+mod entry;
+mod estimate;
+mod sample;
+pub mod status;
+pub mod transfer;
+
+pub use entry::WireEntry;
+pub use estimate::WireEstimate;
+pub use sample::WireSample;
