@@ -1,0 +1,141 @@
+//! Numbers for people and numbers for the page.
+
+use serde_json::Value;
+
+/// A number with three significant digits and its unit (`0.124 m`); without the unit if that is empty.
+/// What is not finite reads `n/a`.
+pub fn quantity(value: f64, unit: &str) -> String {
+    if !value.is_finite() {
+        return "n/a".to_owned();
+    }
+    let magnitude = value.abs();
+    let number = if magnitude == 0.0 {
+        "0".to_owned()
+    } else if magnitude < 5e-4 || magnitude >= 1e7 {
+        format!("{value:.2e}")
+    } else if magnitude >= 99.95 {
+        grouped(value.abs().round(), value < 0.0)
+    } else if magnitude >= 9.995 {
+        format!("{value:.1}")
+    } else if magnitude >= 0.9995 {
+        format!("{value:.2}")
+    } else {
+        format!("{value:.3}")
+    };
+    if unit.is_empty() { number } else { format!("{number} {unit}") }
+}
+
+/// A whole number with its thousands apart (`12,345`).
+pub(crate) fn count(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (position, digit) in digits.chars().enumerate() {
+        if position > 0 && (digits.len() - position) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the caller bounds it below 1e7")]
+fn grouped(magnitude: f64, negative: bool) -> String {
+    format!("{}{}", if negative { "-" } else { "" }, count(magnitude as u64))
+}
+
+/// A whole number of bytes in a readable unit (`1.20 MB`).
+pub(crate) fn bytes(value: u64) -> String {
+    let value = value as f64;
+    if value < 1e3 {
+        format!("{value} B")
+    } else if value < 1e6 {
+        quantity(value / 1e3, "kB")
+    } else {
+        quantity(value / 1e6, "MB")
+    }
+}
+
+/// The values as JSON with as many digits as a picture shows: an error of at most 5e-6 of their span
+/// *and* of at most 5e-5 of each value (the second matters on logarithmic axes). What is not finite
+/// becomes `null`, which Plotly draws as a gap.
+pub(crate) fn compact(values: &[f64]) -> Vec<Value> {
+    let finite = || values.iter().copied().filter(|value| value.is_finite());
+    let least = finite().fold(f64::INFINITY, f64::min);
+    let greatest = finite().fold(f64::NEG_INFINITY, f64::max);
+    let span_decimals = if greatest > least { 5.0 - (greatest - least).log10().floor() } else { 0.0 };
+    values
+        .iter()
+        .map(|&value| {
+            let own_decimals = if value == 0.0 { 0.0 } else { 4.0 - value.abs().log10().floor() };
+            Value::from(rounded(value, span_decimals.max(own_decimals)))
+        })
+        .collect()
+}
+
+/// The value with `decimals` decimals; as it is where that is beyond the digits of a double.
+#[allow(clippy::cast_possible_truncation, reason = "checked to lie within -15..=15")]
+fn rounded(value: f64, decimals: f64) -> f64 {
+    if !value.is_finite() || !(-15.0..=15.0).contains(&decimals) {
+        return value;
+    }
+    let scale = 10_f64.powi(decimals as i32);
+    let result = (value * scale).round() / scale;
+    // Minus zero would read oddly in the page.
+    if result == 0.0 { 0.0 } else { result }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantities_have_three_significant_digits() {
+        let cases = [
+            (0.0, "0 m"),
+            (0.1239, "0.124 m"),
+            (1.234_56, "1.23 m"),
+            (12.3456, "12.3 m"),
+            (-123.456, "-123 m"),
+            (12_345.6, "12,346 m"),
+            (0.000_012_3, "1.23e-5 m"),
+            (f64::NAN, "n/a"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(quantity(value, "m"), text);
+        }
+        assert_eq!(quantity(2.0, ""), "2.00");
+    }
+
+    #[test]
+    fn counts_and_bytes_are_readable() {
+        assert_eq!(count(7), "7");
+        assert_eq!(count(1_234_567), "1,234,567");
+        assert_eq!(bytes(512), "512 B");
+        assert_eq!(bytes(1_234_567), "1.23 MB");
+    }
+
+    #[test]
+    fn non_finite_values_become_null() {
+        let json = compact(&[1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY]);
+        assert_eq!(json, [Value::from(1.0), Value::Null, Value::Null, Value::Null]);
+    }
+
+    #[test]
+    fn rounding_stays_within_its_stated_error() {
+        // A Unix epoch with a small span, a wide logarithmic range, a line through zero.
+        let columns = [
+            (0..500).map(|i| 1_248_273_546.275 + f64::from(i) * 0.0137).collect::<Vec<_>>(),
+            (0..500).map(|i| 1e-4 * 1.05_f64.powi(i)).collect(),
+            (0..500).map(|i| (f64::from(i) - 250.0) * 0.012_345_678_9).collect(),
+        ];
+        for column in columns {
+            let span = column[499] - column[0];
+            for (before, after) in column.iter().zip(compact(&column)) {
+                let error = (before - after.as_f64().unwrap()).abs();
+                // One ulp of the largest value on top, for the epoch column.
+                let allowed = (5.1e-6 * span).min(5.1e-5 * before.abs()) + 2.4e-7_f64.min(before.abs() * 1e-15);
+                assert!(error <= allowed, "{before}: {error} > {allowed}");
+            }
+        }
+    }
+}

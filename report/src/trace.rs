@@ -1,0 +1,217 @@
+//! What is drawn in a figure: lines, markers, bands, polygons, bars.
+
+use serde_json::{Map, Value, json};
+
+use crate::decimate::indices_keeping_extremes;
+use crate::html::label;
+use crate::number::compact;
+use crate::palette::{Colour, Dash};
+use crate::MAX_POINTS;
+
+/// One trace of a figure. Long series are thinned to their extremes, see [`crate::MAX_POINTS`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    pub(crate) json: Map<String, Value>,
+    pub(crate) row: usize,
+    pub(crate) thinned: bool,
+}
+
+impl Trace {
+    /// A line through `(x, y)`; entries that are not finite are gaps.
+    pub fn line(name: &str, x: &[f64], y: &[f64], colour: Colour) -> Self {
+        Self::series(name, x, y, &[y], MAX_POINTS, colour, "lines")
+    }
+
+    /// A line in the plane, whose horizontal extremes matter as much as its vertical ones.
+    pub fn path(name: &str, x: &[f64], y: &[f64], colour: Colour) -> Self {
+        Self::series(name, x, y, &[x, y], MAX_POINTS, colour, "lines")
+    }
+
+    /// A line that holds each value until the next.
+    pub fn step(name: &str, x: &[f64], y: &[f64], colour: Colour) -> Self {
+        Self::line(name, x, y, colour).with_line("shape", "hv".into())
+    }
+
+    /// Points of `size_px` with a symbol of Plotly's (`circle`, `circle-open`, `x`, `diamond`).
+    pub fn markers(name: &str, x: &[f64], y: &[f64], colour: Colour, symbol: &str, size_px: f64) -> Self {
+        let mut trace = Self::series(name, x, y, &[y], MAX_POINTS, colour, "markers");
+        trace.json.remove("line");
+        trace.json.insert(
+            "marker".into(),
+            json!({"color": colour.code(), "symbol": symbol, "size": size_px, "line": {"width": 1.5, "color": colour.code()}}),
+        );
+        trace
+    }
+
+    /// The area between two curves over `x`, filled; instants where one is not finite are left out.
+    pub fn band(name: &str, x: &[f64], lower: &[f64], upper: &[f64], colour: Colour) -> Self {
+        let kept = indices_keeping_extremes(&[lower, upper], MAX_POINTS / 2);
+        let length = x.len().min(lower.len()).min(upper.len());
+        let inside = |&&i: &&usize| x[i].is_finite() && lower[i].is_finite() && upper[i].is_finite();
+        let kept_inside: Vec<usize> = kept.iter().filter(inside).copied().collect();
+        let around = |ahead: &[f64], back: &[f64]| -> Vec<f64> {
+            let there = kept_inside.iter().map(|&i| ahead[i]);
+            there.chain(kept_inside.iter().rev().map(|&i| back[i])).collect()
+        };
+        Self::area(name, &around(x, x), &around(upper, lower), colour, kept.len() < length)
+    }
+
+    /// Filled polygons, each closed by its first point.
+    pub fn polygons(name: &str, outlines: &[Vec<[f64; 2]>], colour: Colour) -> Self {
+        let gap = [f64::NAN; 2];
+        let points: Vec<[f64; 2]> =
+            outlines.iter().flat_map(|outline| outline.iter().copied().chain([gap])).collect();
+        let column = |axis: usize| points.iter().map(|point| point[axis]).collect::<Vec<f64>>();
+        let mut trace = Self::area(name, &column(0), &column(1), colour, false);
+        trace.json.insert("line".into(), json!({"color": colour.code(), "width": 1}));
+        trace
+    }
+
+    /// Bars over named categories.
+    pub fn bars(name: &str, categories: &[String], values: &[f64], colour: Colour) -> Self {
+        let json = json!({
+            "type": "bar",
+            "name": label(name),
+            "x": categories.iter().map(|category| label(category)).collect::<Vec<_>>(),
+            "y": compact(values),
+            "marker": {"color": colour.code()},
+        });
+        Self::from_json(json, false)
+    }
+
+    /// The pattern of the line.
+    pub fn dash(self, dash: Dash) -> Self {
+        self.with_line("dash", dash.code().into())
+    }
+
+    /// The width of the line, pixels.
+    pub fn width(self, width_px: f64) -> Self {
+        self.with_line("width", width_px.into())
+    }
+
+    /// From 0, invisible, to 1.
+    pub fn opacity(self, opacity: f64) -> Self {
+        self.with("opacity", opacity.into())
+    }
+
+    /// Not in the legend; shown and hidden with its group.
+    pub fn unlisted(self) -> Self {
+        self.with("showlegend", false.into())
+    }
+
+    /// Shown and hidden with the others of its group.
+    pub fn group(self, group: &str) -> Self {
+        self.with("legendgroup", group.into())
+    }
+
+    /// The heading of its group in the legend.
+    pub fn group_heading(self, heading: &str) -> Self {
+        self.with("legendgrouptitle", json!({"text": label(heading)}))
+    }
+
+    /// Hidden until chosen in the legend.
+    pub fn on_request(self) -> Self {
+        self.with("visible", "legendonly".into())
+    }
+
+    /// Says nothing under the pointer.
+    pub fn silent(self) -> Self {
+        self.with("hoverinfo", "skip".into())
+    }
+
+    /// In the how-manieth row of a figure of several rows, from 0.
+    pub fn in_row(mut self, row: usize) -> Self {
+        self.row = row;
+        self
+    }
+
+    fn series(
+        name: &str,
+        x: &[f64],
+        y: &[f64],
+        columns: &[&[f64]],
+        limit: usize,
+        colour: Colour,
+        mode: &str,
+    ) -> Self {
+        let length = x.len().min(y.len());
+        let mut kept = indices_keeping_extremes(columns, limit);
+        kept.retain(|&i| i < length);
+        let pick = |column: &[f64]| compact(&kept.iter().map(|&i| column[i]).collect::<Vec<f64>>());
+        let json = json!({
+            "type": "scatter",
+            "mode": mode,
+            "name": label(name),
+            "x": pick(x),
+            "y": pick(y),
+            "line": {"color": colour.code(), "width": 1.75},
+        });
+        Self::from_json(json, kept.len() < length)
+    }
+
+    fn area(name: &str, x: &[f64], y: &[f64], colour: Colour, thinned: bool) -> Self {
+        let json = json!({
+            "type": "scatter",
+            "mode": "lines",
+            "name": label(name),
+            "x": compact(x),
+            "y": compact(y),
+            "fill": "toself",
+            "fillcolor": format!("{}/0.16", colour.code()),
+            "line": {"color": colour.code(), "width": 0},
+            "hoverinfo": "skip",
+        });
+        Self::from_json(json, thinned)
+    }
+
+    fn from_json(json: Value, thinned: bool) -> Self {
+        let json = if let Value::Object(map) = json { map } else { Map::new() };
+        Self { json, row: 0, thinned }
+    }
+
+    fn with(mut self, key: &str, value: Value) -> Self {
+        self.json.insert(key.into(), value);
+        self
+    }
+
+    fn with_line(mut self, key: &str, value: Value) -> Self {
+        if let Some(Value::Object(line)) = self.json.get_mut("line") {
+            line.insert(key.into(), value);
+        }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_finite_is_a_gap() {
+        let trace = Trace::line("a", &[0.0, 1.0, 2.0], &[1.0, f64::NAN, 3.0], Colour::Ink);
+        assert_eq!(trace.json["y"], json!([1.0, null, 3.0]));
+        assert!(!trace.thinned);
+    }
+
+    #[test]
+    fn a_band_runs_along_its_upper_and_back_along_its_lower_curve() {
+        let x = [0.0, 1.0, 2.0];
+        let trace = Trace::band("a", &x, &[-1.0, f64::NAN, -2.0], &[1.0, 5.0, 2.0], Colour::Muted);
+        assert_eq!(trace.json["x"], json!([0.0, 2.0, 2.0, 0.0]));
+        assert_eq!(trace.json["y"], json!([1.0, 2.0, -2.0, -1.0]));
+    }
+
+    #[test]
+    fn long_series_say_that_they_are_thinned() {
+        let x: Vec<f64> = (0..100_000).map(f64::from).collect();
+        let trace = Trace::line("a", &x, &x, Colour::Series(0));
+        assert!(trace.thinned);
+        assert!(trace.json["x"].as_array().unwrap().len() <= MAX_POINTS);
+    }
+
+    #[test]
+    fn names_cannot_carry_markup_into_labels() {
+        let trace = Trace::line("<a href='x'>", &[0.0], &[0.0], Colour::Ink);
+        assert_eq!(trace.json["name"], "&lt;a href='x'&gt;");
+    }
+}
