@@ -1,0 +1,205 @@
+//! Reading a scenario file: defaults, then each robot's own settings over them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use pleiad_estimation::{LandmarkId, RobotId};
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+use super::keys::{self, Lines};
+use super::validate::Invalid;
+use super::{Arena, RobotSettings, Scenario};
+use crate::Error;
+
+/// The file as it is written.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Document {
+    name: String,
+    #[serde(default = "first_seed")]
+    seed: i64,
+    duration_s: f64,
+    #[serde(default)]
+    arena: Arena,
+    #[serde(default = "truth_rate_hz")]
+    truth_rate_hz: f64,
+    #[serde(default)]
+    team_size: u32,
+    #[serde(default)]
+    random_landmarks: u32,
+    #[serde(default)]
+    landmarks: Vec<Landmark>,
+    #[serde(default)]
+    defaults: Table,
+    #[serde(default)]
+    robots: Vec<Table>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Landmark {
+    id: u32,
+    x_m: f64,
+    y_m: f64,
+}
+
+/// Seed of a scenario that names none.
+fn first_seed() -> i64 {
+    1
+}
+
+/// Rate of the ground truth of a scenario that names none, Hz; that of the sample recordings.
+fn truth_rate_hz() -> f64 {
+    50.0
+}
+
+impl Document {
+    /// One that has every key.
+    pub(super) fn example(defaults: Table, robot: Table) -> Self {
+        Self {
+            name: String::new(),
+            seed: first_seed(),
+            duration_s: 0.0,
+            arena: Arena::default(),
+            truth_rate_hz: truth_rate_hz(),
+            team_size: 0,
+            random_landmarks: 0,
+            landmarks: vec![Landmark { id: 0, x_m: 0.0, y_m: 0.0 }],
+            defaults,
+            robots: vec![robot],
+        }
+    }
+}
+
+impl Scenario {
+    /// Reads a scenario file.
+    ///
+    /// # Errors
+    /// As [`Scenario::from_toml`], and [`Error::Read`].
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_owned(), source })?;
+        Self::from_toml(&text, &path.display().to_string())
+    }
+
+    /// Reads a scenario from text; `file` is the name that errors give it.
+    ///
+    /// # Errors
+    /// [`Error::Syntax`], [`Error::UnknownKey`], [`Error::Value`], each with file and, where the key is
+    /// written out, its line.
+    pub fn from_toml(text: &str, file: &str) -> Result<Self, Error> {
+        let lines = keys::check(text, file)?;
+        let document: Document = toml::from_str(text).map_err(|error| Error::Syntax {
+            place: keys::place(file, error.span().map(|span| 1 + text[..span.start].matches('\n').count())),
+            message: error.message().to_owned(),
+        })?;
+        Loader { file, lines }.scenario(document)
+    }
+}
+
+struct Loader<'a> {
+    file: &'a str,
+    lines: Lines,
+}
+
+impl Loader<'_> {
+    fn scenario(&self, document: Document) -> Result<Scenario, Error> {
+        let seed = u64::try_from(document.seed)
+            .map_err(|_| self.error("seed", &document.seed, "a whole number from 0"))?;
+        let mut robots = BTreeMap::new();
+        let mut listed = BTreeMap::new();
+        for id in 1..=document.team_size {
+            robots.insert(RobotId(id), self.settings(&document.defaults, "defaults")?);
+        }
+        for (index, table) in document.robots.iter().enumerate() {
+            let path = format!("robots[{index}]");
+            let id = self.robot_id(table, &path)?;
+            if listed.insert(id, path.clone()).is_some() {
+                let expected = "every robot to be listed once".to_owned();
+                return Err(self.error(&format!("{path}.id"), &format!("{id} again"), &expected));
+            }
+            let mut own = table.clone();
+            own.remove("id");
+            robots.insert(id, self.settings(&merge(&document.defaults, &own), &path)?);
+        }
+        let mut landmarks = BTreeMap::new();
+        for (index, landmark) in document.landmarks.iter().enumerate() {
+            let position = [landmark.x_m, landmark.y_m];
+            if landmarks.insert(LandmarkId(landmark.id), position).is_some() {
+                let path = format!("landmarks[{index}].id");
+                let found = format!("{} again", landmark.id);
+                return Err(self.error(&path, &found, "every landmark to be listed once"));
+            }
+        }
+        let scenario = Scenario {
+            name: document.name,
+            seed,
+            duration_s: document.duration_s,
+            arena: document.arena,
+            truth_rate_hz: document.truth_rate_hz,
+            landmarks,
+            random_landmarks: document.random_landmarks,
+            robots,
+        };
+        scenario.check().map_err(|invalid| self.locate(invalid, &listed))?;
+        Ok(scenario)
+    }
+
+    fn robot_id(&self, table: &Table, path: &str) -> Result<RobotId, Error> {
+        let path = format!("{path}.id");
+        let expected = "a whole number from 1";
+        let Some(id) = table.get("id").and_then(Value::as_integer) else {
+            return Err(self.error(&path, &"missing", expected));
+        };
+        match u32::try_from(id) {
+            Ok(number) if number > 0 => Ok(RobotId(number)),
+            _ => Err(self.error(&path, &id, expected)),
+        }
+    }
+
+    fn settings(&self, table: &Table, path: &str) -> Result<RobotSettings, Error> {
+        table.clone().try_into().map_err(|error: toml::de::Error| Error::Syntax {
+            place: keys::place(self.file, self.lines.find(path)),
+            message: error.to_string().trim().replace('\n', " "),
+        })
+    }
+
+    fn error(&self, path: &str, found: &impl ToString, expected: &str) -> Error {
+        Error::Value {
+            place: keys::place(self.file, self.lines.find(path)),
+            key: path.to_owned(),
+            found: found.to_string(),
+            expected: expected.to_owned(),
+        }
+    }
+
+    /// Gives an invalid value its line: where the robot's own table has the key, else the defaults.
+    fn locate(&self, invalid: Invalid, listed: &BTreeMap<RobotId, String>) -> Error {
+        let Invalid { robot, key, found, expected } = invalid;
+        let own = robot.and_then(|robot| listed.get(&robot)).map(|table| format!("{table}.{key}"));
+        let of_defaults = format!("defaults.{key}");
+        let (line, shown) = match own {
+            Some(path) if self.lines.exact(&path).is_some() => (self.lines.exact(&path), path),
+            _ if robot.is_some() => match self.lines.exact(&of_defaults) {
+                Some(line) => (Some(line), of_defaults),
+                None => (None, key.clone()),
+            },
+            _ => (self.lines.find(&key), key.clone()),
+        };
+        Error::Value { place: keys::place(self.file, line), key: shown, found, expected }
+    }
+}
+
+/// `over` on top of `base`, table by table; anything but a table replaces what was there.
+fn merge(base: &Table, over: &Table) -> Table {
+    let mut merged = base.clone();
+    for (key, value) in over {
+        let value = match (merged.get(key), value) {
+            (Some(Value::Table(base)), Value::Table(over)) => Value::Table(merge(base, over)),
+            _ => value.clone(),
+        };
+        merged.insert(key.clone(), value);
+    }
+    merged
+}

@@ -1,0 +1,62 @@
+//! A scenario: who takes part, how they move, what they sense and how well. The file format is TOML;
+//! every key is described in `docs/scenario.md`.
+
+mod keys;
+mod load;
+mod settings;
+mod validate;
+
+use std::collections::BTreeMap;
+
+use pleiad_estimation::{LandmarkId, RobotId};
+use serde::{Deserialize, Serialize};
+
+pub use settings::{
+    Direction, Gps, Gyro, Heading, Motion, MotionNoise, Odometry, OdometryKind, Policy, PriorSettings,
+    RelativeKind, RelativeSensor, RobotSettings, See, Start,
+};
+
+/// A simulation to run: complete, with the defaults already applied to every robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// Name, for people; the name of the recording.
+    pub name: String,
+    /// The seed used where none is asked for.
+    pub seed: u64,
+    /// Length of the run, seconds.
+    pub duration_s: f64,
+    /// Where it takes place.
+    pub arena: Arena,
+    /// Rate of the ground truth in the recording, Hz.
+    pub truth_rate_hz: f64,
+    /// Landmarks at given places, metres.
+    pub landmarks: BTreeMap<LandmarkId, [f64; 2]>,
+    /// Further landmarks at random places, numbered on from the largest given one.
+    pub random_landmarks: u32,
+    /// The team.
+    pub robots: BTreeMap<RobotId, RobotSettings>,
+}
+
+/// The rectangle the robots move in, centred on the origin of the map.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Arena {
+    /// Extent along x, metres.
+    pub width_m: f64,
+    /// Extent along y, metres.
+    pub height_m: f64,
+}
+
+impl Default for Arena {
+    fn default() -> Self {
+        Self { width_m: 20.0, height_m: 20.0 }
+    }
+}
+
+impl Arena {
+    /// `[x_min, x_max, y_min, y_max]`, metres.
+    pub fn bounds_m(&self) -> [f64; 4] {
+        let (half_width, half_height) = (0.5 * self.width_m, 0.5 * self.height_m);
+        [-half_width, half_width, -half_height, half_height]
+    }
+}

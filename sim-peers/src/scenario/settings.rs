@@ -1,0 +1,371 @@
+//! The settings of one robot. Units are in the names; meanings and defaults are listed for users in
+//! `docs/scenario.md`.
+
+use serde::{Deserialize, Serialize};
+
+/// Everything about one robot: body, motion, prior, sensors.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RobotSettings {
+    /// Where it starts; `None` places it at random.
+    pub start: Option<Start>,
+    /// Wheel radius, metres.
+    pub wheel_radius_m: f64,
+    /// Distance between the wheels, metres.
+    pub track_width_m: f64,
+    /// Encoder counts per turn of a wheel; 0 means no quantization.
+    pub encoder_ticks_per_rev: u32,
+    /// Rate of the velocity commands, Hz; rounded so that a whole number of odometry ticks lies between two.
+    pub command_rate_hz: f64,
+    /// Time constant of the forward speed behind its command, seconds.
+    pub servo_time_constant_s: f64,
+    /// Time constant of the yaw rate behind its command, seconds.
+    pub servo_time_constant_turn_s: f64,
+    /// What is known of the start.
+    pub prior: PriorSettings,
+    /// How it moves.
+    pub motion: Motion,
+    /// Its odometry.
+    pub odometry: Odometry,
+    /// Its gyro.
+    pub gyro: Gyro,
+    /// Its GPS receiver.
+    pub gps: Gps,
+    /// Its absolute heading sensor.
+    pub heading: Heading,
+    /// What it sees of other robots and landmarks.
+    pub relative: RelativeSensor,
+}
+
+impl Default for RobotSettings {
+    fn default() -> Self {
+        Self {
+            start: None,
+            wheel_radius_m: 0.08,
+            track_width_m: 0.4,
+            encoder_ticks_per_rev: 0,
+            command_rate_hz: 25.0,
+            servo_time_constant_s: 0.1,
+            servo_time_constant_turn_s: 0.1,
+            prior: PriorSettings::default(),
+            motion: Motion::default(),
+            odometry: Odometry::default(),
+            gyro: Gyro::default(),
+            gps: Gps::default(),
+            heading: Heading::default(),
+            relative: RelativeSensor::default(),
+        }
+    }
+}
+
+/// A start pose in the map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Start {
+    /// Position along x, metres.
+    pub x_m: f64,
+    /// Position along y, metres.
+    pub y_m: f64,
+    /// Heading, radians.
+    pub heading_rad: f64,
+}
+
+/// How well the start is known.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PriorSettings {
+    /// Whether the robot is told its start at all.
+    pub known: bool,
+    /// Standard deviation of the told position per axis, metres.
+    pub sigma_position_m: f64,
+    /// Standard deviation of the told heading, radians.
+    pub sigma_heading_rad: f64,
+}
+
+impl Default for PriorSettings {
+    fn default() -> Self {
+        Self { known: true, sigma_position_m: 0.05, sigma_heading_rad: 0.01 }
+    }
+}
+
+/// How a robot moves.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Motion {
+    /// Which rule.
+    pub policy: Policy,
+    /// Cruising speed (the fastest of `waypoints_random`), m/s.
+    pub speed_m_s: f64,
+    /// Slowest cruising speed of `waypoints_random`, m/s.
+    pub min_speed_m_s: f64,
+    /// Largest commanded yaw rate, rad/s.
+    pub max_yaw_rate_rad_s: f64,
+    /// Sense of `circle` and `square`, first loop of `figure_eight`.
+    pub direction: Direction,
+    /// Radius of `circle` and of each loop of `figure_eight`, metres.
+    pub radius_m: f64,
+    /// Side of `square`, length of `line_back_and_forth`, metres.
+    pub side_m: f64,
+    /// Length of a turn to move under `portable_landmarks` and `one_mover`, seconds.
+    pub move_s: f64,
+    /// Where random waypoints lie, `[x_min, x_max, y_min, y_max]`; `None` means the whole arena.
+    pub area_m: Option<[f64; 4]>,
+    /// Distance wandering robots try to keep from others, metres; 0 means they do not look.
+    pub keep_away_m: f64,
+}
+
+impl Default for Motion {
+    fn default() -> Self {
+        Self {
+            policy: Policy::WaypointsRandom,
+            speed_m_s: 0.8,
+            min_speed_m_s: 0.4,
+            max_yaw_rate_rad_s: 1.0,
+            direction: Direction::CounterClockwise,
+            radius_m: 2.0,
+            side_m: 4.0,
+            move_s: 15.0,
+            area_m: None,
+            keep_away_m: 0.5,
+        }
+    }
+}
+
+/// Rules of motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Policy {
+    /// From one random point to the next.
+    WaypointsRandom,
+    /// A constant speed and yaw rate.
+    Circle,
+    /// Two circles in turn, in opposite senses.
+    FigureEight,
+    /// A square with turns on the spot, as UMBmark drives it.
+    Square,
+    /// Forth, about-turn, back, about-turn.
+    LineBackAndForth,
+    /// Standing still.
+    Parked,
+    /// Half of the robots under this rule stand while the other half wanders, in turn
+    /// (Kurazume's portable landmarks).
+    PortableLandmarks,
+    /// One robot after the other wanders while the rest stand (millibots).
+    OneMover,
+}
+
+/// A sense of turning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Direction {
+    /// To the left.
+    CounterClockwise,
+    /// To the right.
+    Clockwise,
+}
+
+/// What a robot knows of its own motion.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Odometry {
+    /// In which form.
+    pub kind: OdometryKind,
+    /// Rate, Hz; also the tick on which the wheels hold their speed.
+    pub rate_hz: f64,
+    /// How the body departs from what the wheels did.
+    pub noise: MotionNoise,
+}
+
+impl Default for Odometry {
+    fn default() -> Self {
+        Self { kind: OdometryKind::Velocity, rate_hz: 25.0, noise: MotionNoise::default() }
+    }
+}
+
+/// Forms of odometry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OdometryKind {
+    /// Forward speed and yaw rate that hold until the next sample.
+    Velocity,
+    /// Cumulative wheel angles.
+    Wheels,
+    /// Motion since the previous sample.
+    Increment,
+}
+
+/// White process noise in the body frame.
+///
+/// Over a tick of `dt` seconds in which the wheels say `U = exp((v dt, 0, w dt))` the body moves by
+/// `U exp(n)`, `n ~ N(0, diag(`[`MotionNoise::variance`]`))`: exactly the law of a filter that propagates
+/// with `U` and adds this variance in the frame of the pose after the step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MotionNoise {
+    /// Forward, per square root of time, m/sqrt(s).
+    pub speed_m_per_sqrt_s: f64,
+    /// Sideways, per square root of time, m/sqrt(s).
+    pub lateral_m_per_sqrt_s: f64,
+    /// Yaw, per square root of time, rad/sqrt(s).
+    pub yaw_rad_per_sqrt_s: f64,
+    /// Forward, per square root of distance driven, m/sqrt(m).
+    pub speed_m_per_sqrt_m: f64,
+    /// Yaw, per square root of angle turned, rad/sqrt(rad).
+    pub yaw_rad_per_sqrt_rad: f64,
+    /// No noise over ticks in which the wheels stand still.
+    pub quiet_at_standstill: bool,
+}
+
+impl Default for MotionNoise {
+    fn default() -> Self {
+        Self {
+            speed_m_per_sqrt_s: 0.02,
+            lateral_m_per_sqrt_s: 0.002,
+            yaw_rad_per_sqrt_s: 0.01,
+            speed_m_per_sqrt_m: 0.0,
+            yaw_rad_per_sqrt_rad: 0.0,
+            quiet_at_standstill: true,
+        }
+    }
+}
+
+impl MotionNoise {
+    /// Variances of `(x, y, yaw)` in m^2, m^2, rad^2 over a tick of `dt_s` seconds in which the wheels
+    /// say `forward_m` and `turn_rad`.
+    pub fn variance(&self, forward_m: f64, turn_rad: f64, dt_s: f64) -> [f64; 3] {
+        if self.quiet_at_standstill && forward_m == 0.0 && turn_rad == 0.0 {
+            return [0.0; 3];
+        }
+        [
+            self.speed_m_per_sqrt_s.powi(2) * dt_s + self.speed_m_per_sqrt_m.powi(2) * forward_m.abs(),
+            self.lateral_m_per_sqrt_s.powi(2) * dt_s,
+            self.yaw_rad_per_sqrt_s.powi(2) * dt_s + self.yaw_rad_per_sqrt_rad.powi(2) * turn_rad.abs(),
+        ]
+    }
+}
+
+/// A gyro.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Gyro {
+    /// Rate, Hz; 0 means none.
+    pub rate_hz: f64,
+    /// White noise of a sample, rad/s.
+    pub sigma_rad_s: f64,
+    /// Constant bias, rad/s.
+    pub bias_rad_s: f64,
+}
+
+impl Default for Gyro {
+    fn default() -> Self {
+        Self { rate_hz: 0.0, sigma_rad_s: 0.005, bias_rad_s: 0.0 }
+    }
+}
+
+/// A GPS receiver.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Gps {
+    /// Rate, Hz; 0 means none.
+    pub rate_hz: f64,
+    /// Noise per axis, metres.
+    pub sigma_m: f64,
+    /// `[from, until)` in seconds during which there is reception; empty means always.
+    pub windows_s: Vec<[f64; 2]>,
+}
+
+impl Default for Gps {
+    fn default() -> Self {
+        Self { rate_hz: 0.0, sigma_m: 0.5, windows_s: Vec::new() }
+    }
+}
+
+/// An absolute heading sensor (sun sensor, compass).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Heading {
+    /// Rate, Hz; 0 means none.
+    pub rate_hz: f64,
+    /// Noise, radians.
+    pub sigma_rad: f64,
+}
+
+impl Default for Heading {
+    fn default() -> Self {
+        Self { rate_hz: 0.0, sigma_rad: 0.02 }
+    }
+}
+
+/// A sensor of other robots and landmarks, at the body's origin, looking forward.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RelativeSensor {
+    /// Rate of scans, Hz; 0 means none.
+    pub rate_hz: f64,
+    /// What is measured.
+    pub kind: RelativeKind,
+    /// Whom it can see.
+    pub see: See,
+    /// Targets nearer than this are not seen, metres.
+    pub min_range_m: f64,
+    /// Targets farther than this are not seen, metres.
+    pub max_range_m: f64,
+    /// Half the field of view, radians; pi means all around.
+    pub half_fov_rad: f64,
+    /// Noise of a range, metres.
+    pub sigma_range_m: f64,
+    /// Noise of a bearing, radians.
+    pub sigma_bearing_rad: f64,
+    /// Noise of a position or of the position of a pose, per axis, metres.
+    pub sigma_position_m: f64,
+    /// Noise of the yaw of a pose, radians.
+    pub sigma_yaw_rad: f64,
+    /// Probability that a visible target is missed.
+    pub drop_out: f64,
+}
+
+impl Default for RelativeSensor {
+    fn default() -> Self {
+        Self {
+            rate_hz: 0.0,
+            kind: RelativeKind::RangeBearing,
+            see: See::Robots,
+            min_range_m: 0.3,
+            max_range_m: 12.0,
+            half_fov_rad: std::f64::consts::PI,
+            sigma_range_m: 0.1,
+            sigma_bearing_rad: 0.03,
+            sigma_position_m: 0.1,
+            sigma_yaw_rad: 0.03,
+            drop_out: 0.0,
+        }
+    }
+}
+
+/// What a relative sensor measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RelativeKind {
+    /// Distance and direction.
+    RangeBearing,
+    /// Position and yaw of a robot; position alone of a landmark, which has no yaw.
+    Pose,
+    /// Position.
+    Position,
+    /// Distance.
+    Range,
+    /// Direction.
+    Bearing,
+}
+
+/// Whom a relative sensor can see.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum See {
+    /// Robots of the team.
+    Robots,
+    /// Landmarks of the map.
+    Landmarks,
+    /// Both.
+    Both,
+}

@@ -1,0 +1,78 @@
+//! What the nominal simulation believes of a simulated team: the settings themselves.
+
+use std::collections::BTreeMap;
+
+use pleiad_recording::{Nominal, NominalNoise, NominalRangeSensor, NominalRobot};
+
+use crate::Scenario;
+use crate::scenario::{OdometryKind, RobotSettings};
+
+/// The nominal of a scenario. Noises and the range sensor are stated once for the team: where robots
+/// differ, the largest noise and the widest sensor among those that have the channel.
+pub(super) fn nominal(scenario: &Scenario) -> Nominal {
+    let greatest = |has: fn(&RobotSettings) -> f64, value: fn(&RobotSettings) -> f64| {
+        scenario.robots.values().filter(|settings| has(settings) > 0.0).map(value).fold(0.0, f64::max)
+    };
+    let seeing: fn(&RobotSettings) -> f64 = |robot| robot.relative.rate_hz;
+    let noise = NominalNoise {
+        gyro_sigma_rad_s: greatest(|robot| robot.gyro.rate_hz, |robot| robot.gyro.sigma_rad_s),
+        gps_sigma_m: greatest(|robot| robot.gps.rate_hz, |robot| robot.gps.sigma_m),
+        heading_sigma_rad: greatest(|robot| robot.heading.rate_hz, |robot| robot.heading.sigma_rad),
+        range_sigma_m: greatest(seeing, |robot| robot.relative.sigma_range_m),
+        bearing_sigma_rad: greatest(seeing, |robot| robot.relative.sigma_bearing_rad),
+        odometry_floor_pos_sigma_m_per_1s: greatest(|_| 1.0, |robot| one_second(robot)[0]),
+        odometry_floor_heading_sigma_rad_per_1s: greatest(|_| 1.0, |robot| one_second(robot)[2]),
+        ..NominalNoise::default()
+    };
+    let range_sensor = NominalRangeSensor {
+        max_range_m: greatest(seeing, |robot| robot.relative.max_range_m),
+        min_range_m: scenario
+            .robots
+            .values()
+            .filter(|robot| seeing(robot) > 0.0)
+            .map(|robot| robot.relative.min_range_m)
+            .reduce(f64::min)
+            .unwrap_or(0.0),
+        half_fov_rad: greatest(seeing, |robot| robot.relative.half_fov_rad),
+        detection_probability: greatest(seeing, |robot| 1.0 - robot.relative.drop_out),
+        range_scale: 1.0,
+        ..NominalRangeSensor::default()
+    };
+    let robots = scenario.robots.iter().map(|(robot, settings)| (*robot, nominal_robot(settings))).collect();
+    Nominal { noise, range_sensor, robots }
+}
+
+/// Standard deviations over one second of driving at cruising speed and full turn.
+fn one_second(robot: &RobotSettings) -> [f64; 3] {
+    let motion = &robot.motion;
+    robot.odometry.noise.variance(motion.speed_m_s, motion.max_yaw_rate_rad_s, 1.0).map(f64::sqrt)
+}
+
+fn nominal_robot(robot: &RobotSettings) -> NominalRobot {
+    let odometry = match robot.odometry.kind {
+        OdometryKind::Wheels => "wheel_odometry_rate_hz",
+        OdometryKind::Velocity | OdometryKind::Increment => "odometry_rate_hz",
+    };
+    let rates_hz = BTreeMap::from(
+        [
+            ("command_rate_hz", robot.command_rate_hz),
+            (odometry, robot.odometry.rate_hz),
+            ("gyro_rate_hz", robot.gyro.rate_hz),
+            ("gps_rate_hz", robot.gps.rate_hz),
+            ("heading_rate_hz", robot.heading.rate_hz),
+            ("relative_rate_hz", robot.relative.rate_hz),
+        ]
+        .map(|(key, rate_hz)| (key.to_owned(), rate_hz)),
+    );
+    NominalRobot {
+        wheel_radius: robot.wheel_radius_m,
+        track_width: robot.track_width_m,
+        encoder_ticks_per_rev: f64::from(robot.encoder_ticks_per_rev),
+        servo_time_constant_s: robot.servo_time_constant_s,
+        servo_time_constant_turn_s: robot.servo_time_constant_turn_s,
+        gyro_bias_rad_s: robot.gyro.bias_rad_s,
+        gyro_scale: 1.0,
+        rates_hz,
+        ..NominalRobot::default()
+    }
+}

@@ -1,0 +1,70 @@
+//! Where chance comes from: one generator per robot, channel and item, each keyed by all of them.
+//! ChaCha is a keyed function whose outputs under different keys are unrelated, so a further robot or
+//! sensor takes nothing from the others' streams.
+
+use pleiad_estimation::RobotId;
+use rand_chacha::ChaCha12Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
+
+/// The seed of a run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seed(pub(super) u64);
+
+/// What a stream is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Channel {
+    Landmarks = 1,
+    Placement = 2,
+    Prior = 3,
+    Waypoints = 4,
+    Slip = 5,
+    Odometry = 6,
+    Gyro = 7,
+    Gps = 8,
+    Heading = 9,
+    Relative = 10,
+}
+
+/// Ends every key, so that no other use of a bare seed shares a stream with the world.
+const PURPOSE: &[u8; 8] = b"worldsim";
+/// Marks the phase of a channel among its items; targets are below.
+const PHASE_ITEM: u64 = u64::MAX;
+
+impl Seed {
+    /// The stream of a robot's channel.
+    pub(super) fn stream(self, robot: RobotId, channel: Channel) -> ChaCha12Rng {
+        self.item_stream(robot, channel, 0)
+    }
+
+    /// The stream of one item of a robot's channel: a target it may see.
+    pub(super) fn item_stream(self, robot: RobotId, channel: Channel, item: u64) -> ChaCha12Rng {
+        let mut key = [0; 32];
+        key[..8].copy_from_slice(&self.0.to_le_bytes());
+        key[8..12].copy_from_slice(&robot.0.to_le_bytes());
+        key[12..16].copy_from_slice(&(channel as u32).to_le_bytes());
+        key[16..24].copy_from_slice(&item.to_le_bytes());
+        key[24..].copy_from_slice(PURPOSE);
+        ChaCha12Rng::from_seed(key)
+    }
+
+    /// Where in its period a channel samples, as a share of the period in `[0, 1)`.
+    pub(super) fn phase(self, robot: RobotId, channel: Channel) -> f64 {
+        uniform(&mut self.item_stream(robot, channel, PHASE_ITEM))
+    }
+}
+
+/// A standard normal variate.
+pub(super) fn normal(stream: &mut ChaCha12Rng) -> f64 {
+    StandardNormal.sample(stream)
+}
+
+/// A uniform variate in `[0, 1)`.
+pub(super) fn uniform(stream: &mut ChaCha12Rng) -> f64 {
+    StandardUniform.sample(stream)
+}
+
+/// A uniform variate between two numbers.
+pub(super) fn between(stream: &mut ChaCha12Rng, least: f64, greatest: f64) -> f64 {
+    least + (greatest - least) * uniform(stream)
+}
