@@ -79,7 +79,9 @@ impl fmt::Display for Sequence {
 
 impl fmt::Display for Timestamp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.9} s", self.seconds())
+        // From the integer: a Unix time has more digits than an f64.
+        let (sign, nanos) = (if self.0 < 0 { "-" } else { "" }, self.0.unsigned_abs());
+        write!(f, "{sign}{}.{:09} s", nanos / 1_000_000_000, nanos % 1_000_000_000)
     }
 }
 
@@ -92,6 +94,8 @@ mod tests {
         // MRCLAM stamps are Unix seconds with milliseconds.
         let t = Timestamp::from_seconds(1_248_273_546.275);
         assert!((t.seconds() - 1_248_273_546.275).abs() < 5e-7);
+        assert_eq!(Timestamp(1_248_273_546_275_000_001).to_string(), "1248273546.275000001 s");
+        assert_eq!(Timestamp(-1_500_000_000).to_string(), "-1.500000000 s");
         assert!((t.plus_seconds(0.5).seconds_since(t) - 0.5).abs() < 1e-12);
     }
 }

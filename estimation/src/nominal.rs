@@ -13,6 +13,7 @@ pub struct NominalTrajectory {
     ticks: VecDeque<Tick>,
     horizon: usize,
     start: Timestamp,
+    distance_m: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -36,12 +37,22 @@ impl NominalTrajectory {
     /// Starts at `time` with `N = nominal` and `C = 0`, keeping the last `horizon` ticks (at least two).
     pub fn new(time: Timestamp, nominal: Pose2, horizon: usize) -> Self {
         let state = NominalState { nominal, noise_sum: Symmetric3::zero() };
-        Self { ticks: VecDeque::from([Tick { time, state }]), horizon: horizon.max(2), start: time }
+        Self {
+            ticks: VecDeque::from([Tick { time, state }]),
+            horizon: horizon.max(2),
+            start: time,
+            distance_m: 0.0,
+        }
     }
 
     /// The first instant of the trajectory.
     pub fn start(&self) -> Timestamp {
         self.start
+    }
+
+    /// Path length so far, metres.
+    pub fn distance_m(&self) -> f64 {
+        self.distance_m
     }
 
     /// The last odometry.
@@ -58,6 +69,7 @@ impl NominalTrajectory {
         let nominal = last.nominal.compose(&Pose2::exp(step.motion));
         let added = step.covariance.congruence(&nominal.adjoint());
         let state = NominalState { nominal, noise_sum: last.noise_sum.plus(added) };
+        self.distance_m += (step.motion.x * step.motion.x + step.motion.y * step.motion.y).sqrt();
         self.ticks.push_back(Tick { time: step.to, state });
         if self.ticks.len() > self.horizon {
             self.ticks.pop_front();

@@ -162,7 +162,9 @@ impl Document {
         let commands: String = self
             .commands
             .iter()
-            .map(|(what, command)| format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command)))
+            .map(|(what, command)| {
+                format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command))
+            })
             .collect();
         let heading = if commands.is_empty() { "" } else { "<h2>Reproduce</h2>\n" };
         format!(
@@ -188,7 +190,9 @@ impl Block {
             Self::Facts(facts) => {
                 let items: String = facts
                     .iter()
-                    .map(|(key, value)| format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value)))
+                    .map(|(key, value)| {
+                        format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value))
+                    })
                     .collect();
                 format!("<dl>\n{items}</dl>\n")
             }
@@ -212,12 +216,16 @@ impl Block {
 
 fn render_figure(panels: &[Panel], caption: &str, numbers: &mut Numbers) -> String {
     let number = numbers.figures;
-    let mut html = format!("<figure id=\"figure-{number}\">\n<div class=\"panels panels-{}\">\n", panels.len().min(3));
+    let mut html =
+        format!("<figure id=\"figure-{number}\">\n<div class=\"panels panels-{}\">\n", panels.len().min(3));
     for panel in panels {
         numbers.plots += 1;
         let plot = numbers.plots;
-        let heading =
-            if panel.heading.is_empty() { String::new() } else { format!("<h3>{}</h3>", escape(&panel.heading)) };
+        let heading = if panel.heading.is_empty() {
+            String::new()
+        } else {
+            format!("<h3>{}</h3>", escape(&panel.heading))
+        };
         html += &format!(
             "<div class=\"panel\">{heading}<div class=\"plot\" id=\"plot-{plot}\" role=\"img\" aria-label=\"{}\"></div>\
              <script type=\"application/json\">{}</script></div>\n",
@@ -230,7 +238,10 @@ fn render_figure(panels: &[Panel], caption: &str, numbers: &mut Numbers) -> Stri
     } else {
         String::new()
     };
-    html + &format!("</div>\n<figcaption><b>Figure {number}.</b> {}{thinned}</figcaption>\n</figure>\n", prose(caption))
+    html + &format!(
+        "</div>\n<figcaption><b>Figure {number}.</b> {}{thinned}</figcaption>\n</figure>\n",
+        prose(caption)
+    )
 }
 
 /// Writes beside `path` and renames, so that no half-written file is ever seen under its name.

@@ -76,7 +76,11 @@ impl Axis {
     }
 
     fn title(&self) -> String {
-        if self.unit.is_empty() { label(&self.quantity) } else { label(&format!("{} ({})", self.quantity, self.unit)) }
+        if self.unit.is_empty() {
+            label(&self.quantity)
+        } else {
+            label(&format!("{} ({})", self.quantity, self.unit))
+        }
     }
 
     /// A value on the axis in Plotly's coordinates.
@@ -181,7 +185,8 @@ impl Figure {
         json.insert("yaxis".into(), axis_name("y", row).into());
         if !json.contains_key("hoverinfo") {
             let name = json.get("name").and_then(Value::as_str).unwrap_or_default();
-            let hover = format!("{}<br>{}<extra>{name}</extra>", self.x.hover("x"), self.rows[row].hover("y"));
+            let hover =
+                format!("{}<br>{}<extra>{name}</extra>", self.x.hover("x"), self.rows[row].hover("y"));
             json.insert("hovertemplate".into(), hover.into());
         }
         Value::Object(json)
@@ -199,7 +204,10 @@ impl Figure {
         for (row, axis) in self.rows.iter().enumerate() {
             let mut y = axis.json();
             let gap = if row == 0 { 0.0 } else { 0.06 };
-            y.insert("domain".into(), json!([1.0 - (row as f64 + 1.0) / count, 1.0 - row as f64 / count - gap]));
+            y.insert(
+                "domain".into(),
+                json!([1.0 - (row as f64 + 1.0) / count, 1.0 - row as f64 / count - gap]),
+            );
             if self.equal_aspect {
                 y.insert("scaleanchor".into(), "x".into());
                 y.insert("constrain".into(), "domain".into());
@@ -256,8 +264,9 @@ mod tests {
 
     #[test]
     fn logarithmic_ranges_and_notes_are_in_decades() {
-        let figure = Figure::new(Axis::new("time", "s"), Axis::new("sigma", "m").logarithmic().range(0.01, 100.0))
-            .note(5.0, 10.0, "here");
+        let figure =
+            Figure::new(Axis::new("time", "s"), Axis::new("sigma", "m").logarithmic().range(0.01, 100.0))
+                .note(5.0, 10.0, "here");
         let layout = figure.to_json()["layout"].clone();
         assert_eq!(layout["yaxis"]["range"], json!([-2.0, 2.0]));
         assert_eq!(layout["annotations"][0]["y"], json!(1.0));
@@ -265,7 +274,8 @@ mod tests {
 
     #[test]
     fn a_map_keeps_the_aspect_of_its_ranges() {
-        let map = Figure::new(Axis::new("x", "m").range(0.0, 10.0), Axis::new("y", "m").range(-2.0, 3.0)).equal_aspect();
+        let map = Figure::new(Axis::new("x", "m").range(0.0, 10.0), Axis::new("y", "m").range(-2.0, 3.0))
+            .equal_aspect();
         assert_eq!(map.to_json()["aspect"], json!(0.5));
         assert_eq!(map.to_json()["layout"]["yaxis"]["scaleanchor"], "x");
     }

@@ -32,7 +32,9 @@ pub use error::ReportError;
 pub use figure::{Axis, Figure};
 pub use number::quantity;
 pub use palette::{Colour, Dash, OKABE_ITO};
-pub use reports::{DemoCase, DemoReport, FactCount, ReplayReport, RobotScore, demo_report, replay_report, run_report};
+pub use reports::{
+    DemoCase, DemoReport, FactCount, ReplayReport, RobotScore, demo_report, replay_report, run_report,
+};
 pub use series::{Landmark, NisPoint, NisSeries, RobotSeries, TeamSeries};
 pub use summary::{summary_text, write_summary};
 pub use table::Table;

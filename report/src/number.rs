@@ -133,7 +133,8 @@ mod tests {
             for (before, after) in column.iter().zip(compact(&column)) {
                 let error = (before - after.as_f64().unwrap()).abs();
                 // One ulp of the largest value on top, for the epoch column.
-                let allowed = (5.1e-6 * span).min(5.1e-5 * before.abs()) + 2.4e-7_f64.min(before.abs() * 1e-15);
+                let allowed =
+                    (5.1e-6 * span).min(5.1e-5 * before.abs()) + 2.4e-7_f64.min(before.abs() * 1e-15);
                 assert!(error <= allowed, "{before}: {error} > {allowed}");
             }
         }

@@ -2,11 +2,11 @@
 
 use serde_json::{Map, Value, json};
 
+use crate::MAX_POINTS;
 use crate::decimate::indices_keeping_extremes;
 use crate::html::label;
 use crate::number::compact;
 use crate::palette::{Colour, Dash};
-use crate::MAX_POINTS;
 
 /// One trace of a figure. Long series are thinned to their extremes, see [`crate::MAX_POINTS`].
 #[derive(Clone, Debug, PartialEq)]

@@ -33,7 +33,8 @@ mod tests {
     #[test]
     fn a_group_of_another_length_is_refused() {
         let categories = ["a".to_owned(), "b".to_owned()];
-        let error = bar_figure("robot", &categories, Axis::new("RMSE", "m"), &[("online", vec![1.0])]).unwrap_err();
+        let error =
+            bar_figure("robot", &categories, Axis::new("RMSE", "m"), &[("online", vec![1.0])]).unwrap_err();
         assert!(error.to_string().contains("1 values for 2 categories"), "{error}");
     }
 }

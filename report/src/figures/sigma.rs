@@ -12,7 +12,8 @@ use crate::{Axis, Colour, Dash, Figure, ReportError, TeamSeries, Trace, quantity
 /// # Errors
 /// [`ReportError::ColumnLength`] if the columns of a robot differ in length.
 pub fn sigma_figure(cases: &[(&str, &TeamSeries)]) -> Result<Figure, ReportError> {
-    let mut figure = Figure::new(Axis::new("time", "s"), Axis::new("position sigma", "m").from_zero()).height(460);
+    let mut figure =
+        Figure::new(Axis::new("time", "s"), Axis::new("position sigma", "m").from_zero()).height(460);
     for (case_index, (case, team)) in cases.iter().enumerate() {
         team.check()?;
         let dash = if cases.len() == 1 { Dash::Solid } else { Dash::of_case(case_index) };
@@ -22,8 +23,9 @@ pub fn sigma_figure(cases: &[(&str, &TeamSeries)]) -> Result<Figure, ReportError
             if let (Some(&time), Some(&last)) = (robot.time_s.last(), sigma.last()) {
                 ends.push((time, last));
             }
-            let mut trace = Trace::line(&robot_name(robot.robot), &robot.time_s, &sigma, Colour::Series(index))
-                .dash(dash);
+            let mut trace =
+                Trace::line(&robot_name(robot.robot), &robot.time_s, &sigma, Colour::Series(index))
+                    .dash(dash);
             if cases.len() > 1 {
                 trace = trace.group(case).group_heading(case);
             }

@@ -105,7 +105,8 @@ pub fn demo_report(demo: &DemoReport) -> Result<Document, ReportError> {
         .verdict(verdict, sentences.join(" "))
         .table(comparison(demo))
         .section("How sure the robots are");
-    let cases: Vec<(&str, &TeamSeries)> = demo.cases.iter().map(|case| (case.name.as_str(), &case.series)).collect();
+    let cases: Vec<(&str, &TeamSeries)> =
+        demo.cases.iter().map(|case| (case.name.as_str(), &case.series)).collect();
     document = document.figure(
         sigma_figure(&cases)?,
         format!(
@@ -116,7 +117,10 @@ pub fn demo_report(demo: &DemoReport) -> Result<Document, ReportError> {
     document = document.section("Where they thought they were").panels(maps(demo)?, maps_caption());
     document = errors(document, demo)?;
     document = explanation(document, demo);
-    let notes = demo.cases.iter().flat_map(|case| case.notes.iter().map(move |note| format!("{}: {note}", case.name)));
+    let notes = demo
+        .cases
+        .iter()
+        .flat_map(|case| case.notes.iter().map(move |note| format!("{}: {note}", case.name)));
     let notes: Vec<String> = notes.collect();
     if !notes.is_empty() {
         document = document.section("Remarks").list(notes);
@@ -159,7 +163,9 @@ fn maps(demo: &DemoReport) -> Result<Vec<Panel>, ReportError> {
 }
 
 fn maps_caption() -> String {
-    format!("The same drive, localized in every case, at one scale. {MAP_CAPTION} Ellipses too wide for the frame are cut.")
+    format!(
+        "The same drive, localized in every case, at one scale. {MAP_CAPTION} Ellipses too wide for the frame are cut."
+    )
 }
 
 fn errors(mut document: Document, demo: &DemoReport) -> Result<Document, ReportError> {
@@ -240,7 +246,8 @@ mod tests {
 
     #[test]
     fn a_failed_prediction_is_not_called_a_success() {
-        let report = |cases| DemoReport { seconds: 60.0, seed: 1, robots: 5, cases, command: "pleiad demo".into() };
+        let report =
+            |cases| DemoReport { seconds: 60.0, seed: 1, robots: 5, cases, command: "pleiad demo".into() };
         let failed = demo_report(&report(vec![case(15, 0.2, 1.5)])).unwrap().render();
         assert!(failed.contains("Not as predicted.") && !failed.contains("<b>As predicted.</b>"));
         let held = demo_report(&report(vec![case(12, 0.2, 1.5)])).unwrap().render();

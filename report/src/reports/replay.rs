@@ -5,9 +5,7 @@ use pleiad_estimation::RobotId;
 use crate::figures::{bar_figure, error_figures, map_figure, nis_figure, share_within_bounds, sigma_figure};
 use crate::number::count;
 use crate::reports::{MAP_CAPTION, SIGMA_MEANING};
-use crate::{
-    Accuracy, Axis, Document, Landmark, NisSeries, Panel, ReportError, Table, TeamSeries, quantity,
-};
+use crate::{Accuracy, Axis, Document, Landmark, NisSeries, Panel, ReportError, Table, TeamSeries, quantity};
 
 /// What a run or a replay showed.
 #[derive(Clone, Debug, PartialEq)]
@@ -211,7 +209,8 @@ fn innovations(mut document: Document, report: &ReplayReport) -> Result<Document
                        an earlier entry.";
         let mut table = Table::new(caption, ["Kind", "Used", "Rejected", "Pending"]).numeric();
         for fact in &report.facts {
-            table = table.row([fact.kind.clone(), count(fact.used), count(fact.rejected), count(fact.pending)]);
+            table =
+                table.row([fact.kind.clone(), count(fact.used), count(fact.rejected), count(fact.pending)]);
         }
         document = document.table(table);
     }

@@ -1,0 +1,458 @@
+//! The driver: connects a [`Node`] to a bus, a clock and a journal on disk. Everything an agent process
+//! does besides thinking is here.
+
+mod publisher;
+
+use std::collections::BTreeSet;
+use std::future::Future;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use pleiad_bus::{Bus, BusError, Incoming, Query};
+use pleiad_estimation::RobotId;
+use pleiad_estimation::fact::Entry;
+use pleiad_protocol::keys::{self, Kind};
+use pleiad_protocol::{
+    ControlReply, ControlRequest, FactsRequest, Message, SensorAck, SensorBatch, TeamName, limits,
+};
+use publisher::Publisher;
+use tokio::sync::mpsc;
+use tokio::time::MissedTickBehavior;
+
+use crate::config::{AgentConfig, ConfigError};
+use crate::journal::{Journal, JournalError};
+use crate::node::{Command, Event, Node, Notice, Record, SettledEstimate};
+use crate::results::{self, ResultsError};
+
+/// A peer that does not answer a request for facts is asked again at its next status.
+const ASK_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long, and how often within it, an agent without a journal asks whether the team knows a former
+/// life of its robot.
+const REJOIN_TRIES: u32 = 5;
+const REJOIN_TIMEOUT: Duration = Duration::from_millis(200);
+
+/// Why an agent ended.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DriverError {
+    /// The configuration cannot be used.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The journal cannot be read or written: nothing may be published without it.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// The results could not be written.
+    #[error(transparent)]
+    Results(#[from] ResultsError),
+    /// The bus failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The bus closed a channel that an agent cannot do without.
+    #[error("the bus closed the channel of {what}")]
+    Closed {
+        /// Which.
+        what: &'static str,
+    },
+}
+
+/// File name of the journal in the agent's folder.
+pub const JOURNAL: &str = "journal.bin";
+
+/// An agent's process, apart from its bus.
+struct Agent<'a, B: Bus> {
+    node: Node,
+    journal: Option<Journal>,
+    folder: Option<PathBuf>,
+    publisher: Publisher<'a, B>,
+    bus: &'a B,
+    team: TeamName,
+    online: Vec<SettledEstimate>,
+    last_ack: Option<SensorAck>,
+    /// Peers with an unanswered request.
+    asked: BTreeSet<RobotId>,
+    answers: mpsc::Sender<(RobotId, Option<Vec<Entry>>)>,
+    misattributed: u64,
+}
+
+/// The channels an agent listens to.
+struct Inputs {
+    facts: mpsc::Receiver<Incoming>,
+    statuses: mpsc::Receiver<Incoming>,
+    samples: mpsc::Receiver<Incoming>,
+    batches: mpsc::Receiver<Query>,
+    requests: mpsc::Receiver<Query>,
+    control: mpsc::Receiver<Query>,
+    answers: mpsc::Receiver<(RobotId, Option<Vec<Entry>>)>,
+}
+
+/// Runs an agent until it is told to shut down, by its control key or by `stop`. Its results are written
+/// then.
+///
+/// # Errors
+/// [`DriverError`].
+pub async fn run<B: Bus + Clone>(
+    config: &AgentConfig,
+    bus: &B,
+    nonce: u64,
+    stop: impl Future<Output = ()> + Send,
+) -> Result<(), DriverError> {
+    let node_config = config.node()?;
+    let team = config.team()?;
+    let robot = node_config.robot;
+    let folder = config.output.directory.clone();
+    let (journal, records) = open_journal(folder.as_ref())?;
+    let fresh = records.is_empty();
+    let node = Node::recover(node_config, nonce, records);
+    let (answers_in, answers) = mpsc::channel(64);
+    let mut agent = Agent {
+        node,
+        journal,
+        folder,
+        publisher: Publisher::new(bus, team.clone(), robot),
+        bus,
+        team,
+        online: Vec::new(),
+        last_ack: None,
+        asked: BTreeSet::new(),
+        answers: answers_in,
+        misattributed: 0,
+    };
+    if fresh {
+        agent.ask_for_former_life().await?;
+    }
+    let inputs = agent.listen(answers).await?;
+    let _token = bus.announce(&keys::of(&agent.team, robot, Kind::Alive)).await?;
+    tracing::info!(robot = robot.0, fresh, "agent is up");
+    let period = Duration::from_secs_f64(config.bus.status_period_s);
+    let sync = Duration::from_secs_f64(config.output.fsync_period_s.max(0.001));
+    let outcome = agent.serve(inputs, period, sync, stop).await;
+    // Whatever ended it, what it knows is worth keeping.
+    let written = agent.finish();
+    outcome.and(written)
+}
+
+fn open_journal(folder: Option<&PathBuf>) -> Result<(Option<Journal>, Vec<Record>), DriverError> {
+    let Some(folder) = folder else { return Ok((None, Vec::new())) };
+    let (journal, found) = Journal::open(&folder.join(JOURNAL))?;
+    if found.torn_bytes > 0 {
+        tracing::warn!(bytes = found.torn_bytes, "the journal's last frame was cut off and is dropped");
+    }
+    Ok((Some(journal), found.records))
+}
+
+impl<B: Bus + Clone> Agent<'_, B> {
+    fn key(&self, kind: Kind) -> String {
+        keys::of(&self.team, self.node.robot(), kind)
+    }
+
+    async fn listen(
+        &self,
+        answers: mpsc::Receiver<(RobotId, Option<Vec<Entry>>)>,
+    ) -> Result<Inputs, DriverError> {
+        Ok(Inputs {
+            facts: self.bus.subscribe(&keys::all(&self.team, Kind::Fact)).await?,
+            statuses: self.bus.subscribe(&keys::all(&self.team, Kind::Status)).await?,
+            samples: self.bus.subscribe(&keys::sensors(&self.team, self.node.robot())).await?,
+            batches: self.bus.serve(&self.key(Kind::SensorBatch)).await?,
+            requests: self.bus.serve(&self.key(Kind::Facts)).await?,
+            control: self.bus.serve(&self.key(Kind::Control)).await?,
+            answers,
+        })
+    }
+
+    /// Without a journal this could still not be the robot's first life. A second log under an index that
+    /// peers already hold would contradict them, so whoever is there is asked first.
+    async fn ask_for_former_life(&mut self) -> Result<(), DriverError> {
+        let question = Message::ControlRequest(ControlRequest::Status).encode();
+        let key = keys::all(&self.team, Kind::Control);
+        for _ in 0..REJOIN_TRIES {
+            let asked = tokio::time::Instant::now();
+            if let Ok(reply) = self.bus.request(&key, question.clone(), REJOIN_TIMEOUT).await {
+                if let Ok(Message::ControlReply(ControlReply::Status(status))) = Message::decode(&reply) {
+                    self.act(Event::Status(status)).await?;
+                }
+                return Ok(());
+            }
+            // Nobody there is said at once; links may still be coming up.
+            tokio::time::sleep_until(asked + REJOIN_TIMEOUT).await;
+        }
+        Ok(())
+    }
+
+    async fn serve(
+        &mut self,
+        mut inputs: Inputs,
+        period: Duration,
+        sync: Duration,
+        stop: impl Future<Output = ()> + Send,
+    ) -> Result<(), DriverError> {
+        let mut status_due = tokio::time::interval(period);
+        let mut sync_due = tokio::time::interval(sync);
+        for interval in [&mut status_due, &mut sync_due] {
+            interval.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        }
+        tokio::pin!(stop);
+        loop {
+            // Facts before samples: an estimate rests on what has already arrived.
+            tokio::select! {
+                biased;
+                () = &mut stop => return Ok(()),
+                query = inputs.control.recv() => {
+                    if self.control(query.ok_or(DriverError::Closed { what: "control" })?).await? {
+                        return Ok(());
+                    }
+                }
+                incoming = inputs.facts.recv() => {
+                    self.fact(incoming.ok_or(DriverError::Closed { what: "facts" })?).await?;
+                }
+                Some((peer, entries)) = inputs.answers.recv() => {
+                    self.asked.remove(&peer);
+                    if let Some(entries) = entries {
+                        self.act(Event::Entries(entries)).await?;
+                    }
+                }
+                query = inputs.requests.recv() => {
+                    self.request(query.ok_or(DriverError::Closed { what: "requests" })?);
+                }
+                incoming = inputs.statuses.recv() => {
+                    self.status(incoming.ok_or(DriverError::Closed { what: "statuses" })?).await?;
+                }
+                incoming = inputs.samples.recv() => {
+                    self.single_sample(incoming.ok_or(DriverError::Closed { what: "samples" })?).await?;
+                }
+                query = inputs.batches.recv() => {
+                    self.batch(query.ok_or(DriverError::Closed { what: "batches" })?).await?;
+                }
+                _ = status_due.tick() => {
+                    let status = self.node.status();
+                    self.publisher.publish(Kind::Status, &Message::Status(status)).await;
+                }
+                _ = sync_due.tick() => {
+                    if let Some(journal) = &mut self.journal {
+                        journal.sync()?;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Handles an event and does what follows from it.
+    async fn act(&mut self, event: Event) -> Result<(), DriverError> {
+        let commands = self.node.handle(event);
+        self.execute(commands).await
+    }
+
+    async fn execute(&mut self, commands: Vec<Command>) -> Result<(), DriverError> {
+        for command in commands {
+            match command {
+                Command::Journal(records) => {
+                    if let Some(journal) = &mut self.journal {
+                        journal.append(&records)?;
+                    }
+                }
+                Command::Publish(entries) => self.publisher.entries(&entries).await,
+                Command::Estimate(estimate) => {
+                    self.online.push(results::online(&estimate));
+                    self.publisher.publish(Kind::Estimate, &Message::Estimate(estimate)).await;
+                }
+                Command::Ask { peer, request } => self.ask(peer, request),
+                Command::Notice(notice) => report(&notice),
+            }
+        }
+        Ok(())
+    }
+
+    /// Asks in the background; one question per peer at a time.
+    fn ask(&mut self, peer: RobotId, request: FactsRequest) {
+        if !self.asked.insert(peer) {
+            return;
+        }
+        let (bus, answers) = (self.bus.clone(), self.answers.clone());
+        let key = keys::of(&self.team, peer, Kind::Facts);
+        tokio::spawn(async move {
+            let question = Message::FactsRequest(request).encode();
+            let reply = bus.request(&key, question, ASK_TIMEOUT).await;
+            let entries = match reply.map(|bytes| pleiad_protocol::decode_entries(&bytes)) {
+                Ok(Ok(entries)) => Some(entries),
+                Ok(Err(error)) => {
+                    tracing::warn!(peer = peer.0, %error, "an answer to a request for facts was refused");
+                    None
+                }
+                Err(error) => {
+                    tracing::debug!(peer = peer.0, %error, "a request for facts was not answered");
+                    None
+                }
+            };
+            // The receiver is gone only when the agent is.
+            let _ = answers.send((peer, entries)).await;
+        });
+    }
+
+    async fn fact(&mut self, incoming: Incoming) -> Result<(), DriverError> {
+        let Some(sender) = self.sender(&incoming.key) else { return Ok(()) };
+        match pleiad_protocol::decode_entries(&incoming.payload) {
+            Ok(mut entries) => {
+                // A robot publishes its own log only; other entries under its key are not believed.
+                let all = entries.len();
+                entries.retain(|entry| entry.id.robot == sender);
+                if entries.len() < all {
+                    self.misattributed += (all - entries.len()) as u64;
+                    tracing::warn!(
+                        sender = sender.0,
+                        total = self.misattributed,
+                        "entries of another robot under this robot's key were refused"
+                    );
+                }
+                self.act(Event::Entries(entries)).await
+            }
+            Err(error) => {
+                tracing::warn!(sender = sender.0, %error, "facts refused");
+                Ok(())
+            }
+        }
+    }
+
+    /// The robot a key belongs to; `None` for this one, whose own publications come back.
+    fn sender(&self, key: &str) -> Option<RobotId> {
+        let robot = key.parse::<keys::Key>().ok()?.robot;
+        (robot != self.node.robot()).then_some(robot)
+    }
+
+    async fn status(&mut self, incoming: Incoming) -> Result<(), DriverError> {
+        let Some(sender) = self.sender(&incoming.key) else { return Ok(()) };
+        match Message::decode(&incoming.payload) {
+            Ok(Message::Status(status)) if status.robot == sender => self.act(Event::Status(status)).await,
+            Ok(other) => {
+                tracing::warn!(sender = sender.0, kind = other.kind(), "not the sender's status");
+                Ok(())
+            }
+            Err(error) => {
+                tracing::warn!(sender = sender.0, %error, "status refused");
+                Ok(())
+            }
+        }
+    }
+
+    async fn single_sample(&mut self, incoming: Incoming) -> Result<(), DriverError> {
+        match pleiad_protocol::decode_sample(&incoming.payload) {
+            Ok(sample) => self.act(Event::Sample(sample)).await,
+            Err(error) => {
+                tracing::warn!(key = incoming.key, %error, "sample refused");
+                Ok(())
+            }
+        }
+    }
+
+    async fn batch(&mut self, query: Query) -> Result<(), DriverError> {
+        let batch = match Message::decode(&query.payload) {
+            Ok(Message::SensorBatch(batch)) => batch,
+            Ok(other) => {
+                tracing::warn!(kind = other.kind(), "not a batch of samples");
+                return Ok(());
+            }
+            Err(error) => {
+                tracing::warn!(%error, "batch refused");
+                return Ok(());
+            }
+        };
+        let ack = match &self.last_ack {
+            Some(ack) if ack.number == batch.number && batch.number != 0 => ack.clone(),
+            _ => self.take_batch(batch).await?,
+        };
+        self.last_ack = Some(ack.clone());
+        self.publisher.reply(query, &Message::SensorAck(ack));
+        Ok(())
+    }
+
+    async fn take_batch(&mut self, batch: SensorBatch) -> Result<SensorAck, DriverError> {
+        let mut ack = SensorAck { number: batch.number, ..SensorAck::default() };
+        let (mut records, mut entries, mut rest) = (Vec::new(), Vec::new(), Vec::new());
+        for sample in batch.samples {
+            let mut refused = false;
+            for command in self.node.handle(Event::Sample(sample)) {
+                match command {
+                    Command::Journal(more) => records.extend(more),
+                    Command::Publish(more) => entries.extend(more),
+                    Command::Notice(Notice::SampleRefused(refusal)) => {
+                        refused = true;
+                        ack.first_refusal.get_or_insert_with(|| refusal.to_string());
+                        rest.push(Command::Notice(Notice::SampleRefused(refusal)));
+                    }
+                    other => rest.push(other),
+                }
+            }
+            if refused { ack.refused += 1 } else { ack.accepted += 1 }
+        }
+        if batch.end {
+            rest.extend(self.node.handle(Event::InputEnded));
+        }
+        // One write and one message for the whole batch, in the order that the rule asks for.
+        let first = [Command::Journal(records), Command::Publish(entries)];
+        let first = first.into_iter().filter(|command| match command {
+            Command::Journal(records) => !records.is_empty(),
+            Command::Publish(entries) => !entries.is_empty(),
+            _ => true,
+        });
+        let commands = first.chain(rest).collect();
+        self.execute(commands).await?;
+        Ok(ack)
+    }
+
+    fn request(&mut self, query: Query) {
+        match Message::decode(&query.payload) {
+            Ok(Message::FactsRequest(request)) => {
+                let entries = self.node.serve(&request, limits::ENTRIES);
+                self.publisher.reply(query, &Message::Entries(entries));
+            }
+            Ok(other) => tracing::warn!(kind = other.kind(), "not a request for facts"),
+            Err(error) => tracing::warn!(%error, "request for facts refused"),
+        }
+    }
+
+    /// Answers a control request; `true` if the agent is to end.
+    async fn control(&mut self, query: Query) -> Result<bool, DriverError> {
+        let Ok(Message::ControlRequest(request)) = Message::decode(&query.payload) else {
+            tracing::warn!("a control request was not understood");
+            return Ok(false);
+        };
+        let (reply, end) = match request {
+            ControlRequest::Status => (ControlReply::Status(self.node.status()), false),
+            ControlRequest::Finish => {
+                self.act(Event::InputEnded).await?;
+                self.finish()?;
+                (ControlReply::Accepted, false)
+            }
+            ControlRequest::Shutdown => (ControlReply::Accepted, true),
+        };
+        if end {
+            // Who asked may look for the results as soon as it has its answer.
+            self.finish()?;
+        }
+        self.publisher.reply(query, &Message::ControlReply(reply));
+        Ok(end)
+    }
+
+    /// Puts the journal on the disk and writes the results.
+    fn finish(&mut self) -> Result<(), DriverError> {
+        if let Some(journal) = &mut self.journal {
+            journal.sync()?;
+        }
+        if let Some(folder) = &self.folder {
+            let (messages, bytes) = self.publisher.sent();
+            let summary = results::summary(&mut self.node, messages, bytes);
+            results::write(folder, &self.node.settled(), &self.online, &summary)?;
+        }
+        Ok(())
+    }
+}
+
+/// A notice in the log, at the level of its audience.
+fn report(notice: &Notice) {
+    match notice {
+        Notice::Equivocation { .. } | Notice::Fork { .. } | Notice::OwnLogAhead { .. } => {
+            tracing::error!(%notice, "the team contradicts itself");
+        }
+        Notice::OdometryGap { .. } => tracing::info!(%notice, "odometry gap"),
+        _ => tracing::warn!(%notice, "degraded"),
+    }
+}

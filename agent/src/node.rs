@@ -1,0 +1,314 @@
+//! The node: one robot's part of the team's filter as a pure state machine. Events in, commands out; no
+//! clock, no file, no network.
+
+mod commands;
+mod intake;
+mod recovery;
+mod segments;
+mod views;
+
+use std::collections::{BTreeMap, VecDeque};
+
+pub use commands::{Command, Event, Notice, Record};
+pub use intake::SampleRefusal;
+pub use views::SettledEstimate;
+
+use pleiad_estimation::fact::{
+    Absolute, Answer, Body, Boot, Continuation, Entry, EntryId, Half, LogId, NoiseRef, Observation, Profile,
+    Quantity, VoidReason,
+};
+use pleiad_estimation::ledger::{Insertion, Ledger};
+use pleiad_estimation::motion::DeadReckoning;
+use pleiad_estimation::nominal::Outside;
+use pleiad_estimation::sample::Sample;
+use pleiad_estimation::symmetric::Symmetric3;
+use pleiad_estimation::{BootIndex, Pose2, RobotId, Sequence, Timestamp};
+use pleiad_protocol::{FactsRequest, LogRange, Status};
+use segments::Segments;
+
+use crate::config::{NodeConfig, SensorsSection};
+
+/// An observation stamped further ahead of the seen robot's odometry than this has a wrong clock, s.
+const LARGEST_CLOCK_ERROR_S: f64 = 2.0;
+/// Own observations that may wait for odometry to reach them.
+const MOST_WAITING: usize = 4096;
+
+/// One robot's part of the team's filter.
+#[derive(Debug)]
+pub struct Node {
+    config: NodeConfig,
+    ledger: Ledger,
+    dead_reckoning: DeadReckoning,
+    /// Nominal trajectories of this robot's boots, the last one current once `booted`.
+    segments: Segments,
+    /// Random for this start of the process; each boot's nonce derives from it.
+    nonce: u64,
+    /// The boot of this start: none before the first odometry.
+    boot: Option<BootIndex>,
+    /// Own observations stamped after the last odometry, by time.
+    waiting: VecDeque<Sample>,
+    next_estimate: Option<i64>,
+    counts: intake::Counts,
+    input_ended: bool,
+    /// The highest boot of this robot that anyone is known to hold a log of.
+    known_boot: Option<BootIndex>,
+    /// Filled while an event is handled.
+    out: Outbox,
+}
+
+/// What one event leads to, in the order in which it must happen: journal first.
+#[derive(Debug, Default)]
+struct Outbox {
+    records: Vec<Record>,
+    entries: Vec<Entry>,
+    rest: Vec<Command>,
+}
+
+impl Node {
+    /// A node that has seen nothing. `nonce` is random and new for every start of the process.
+    pub fn new(config: NodeConfig, nonce: u64) -> Self {
+        Self {
+            ledger: Ledger::new(config.fold),
+            dead_reckoning: DeadReckoning::new(config.motion),
+            config,
+            segments: Segments::default(),
+            nonce,
+            boot: None,
+            waiting: VecDeque::new(),
+            next_estimate: None,
+            counts: intake::Counts::default(),
+            input_ended: false,
+            known_boot: None,
+            out: Outbox::default(),
+        }
+    }
+
+    /// Handles one event. The commands are to be carried out in their order; a `Journal` is to be on its
+    /// way to the disk before the `Publish` after it.
+    pub fn handle(&mut self, event: Event) -> Vec<Command> {
+        match event {
+            Event::Sample(sample) => self.sample(sample),
+            Event::Entries(entries) => self.entries(entries),
+            Event::Status(status) => self.peer_status(&status),
+            Event::InputEnded => self.end_input(),
+        }
+        let Outbox { records, entries, rest } = std::mem::take(&mut self.out);
+        let mut commands = Vec::with_capacity(rest.len() + 2);
+        if !records.is_empty() {
+            commands.push(Command::Journal(records));
+        }
+        if !entries.is_empty() {
+            commands.push(Command::Publish(entries));
+        }
+        commands.extend(rest);
+        commands
+    }
+
+    /// This robot.
+    pub fn robot(&self) -> RobotId {
+        self.config.robot
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &NodeConfig {
+        &self.config
+    }
+
+    /// All facts held.
+    pub fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    /// The entries a peer asked for, at most `most`.
+    pub fn serve(&self, request: &FactsRequest, most: usize) -> Vec<Entry> {
+        let mut entries = Vec::new();
+        for range in &request.ranges {
+            let wanted = usize::try_from(range.to.saturating_sub(range.from)).unwrap_or(usize::MAX);
+            let held = self.ledger.entries(range.log, range.from);
+            let room = most.saturating_sub(entries.len());
+            entries.extend(held.iter().take(wanted.min(room)).cloned());
+        }
+        entries
+    }
+
+    fn entries(&mut self, entries: Vec<Entry>) {
+        let mut added = false;
+        for entry in entries {
+            let id = entry.id;
+            if id.robot == self.config.robot && !self.take_own(id) {
+                continue;
+            }
+            match self.ledger.insert(entry.clone()) {
+                Insertion::Added { .. } => {
+                    added = true;
+                    self.out.records.push(Record::Entry(entry));
+                }
+                Insertion::Waiting => {
+                    self.out.records.push(Record::Entry(entry));
+                    self.ask_for_gap(id);
+                }
+                Insertion::Duplicate => {}
+                Insertion::Refused(refusal) => self.notice(Notice::EntryRefused { id, refusal }),
+                Insertion::Equivocation => self.notice(Notice::Equivocation { id }),
+            }
+        }
+        if added {
+            self.answer();
+        }
+    }
+
+    /// Own entries come back from peers after a journal was lost; those of the current boot can only be
+    /// copies of what is held.
+    fn take_own(&mut self, id: EntryId) -> bool {
+        if self.boot == Some(id.boot) {
+            if self.ledger.log(id.log()).is_none_or(|log| log.held() <= id.sequence.0) {
+                self.notice(Notice::OwnLogAhead { id });
+            }
+            return false;
+        }
+        self.known_boot = self.known_boot.max(Some(id.boot));
+        true
+    }
+
+    fn ask_for_gap(&mut self, id: EntryId) {
+        let from = self.ledger.log(id.log()).map_or(0, pleiad_estimation::ledger::Log::held);
+        let range = LogRange { log: id.log(), from, to: id.sequence.0 };
+        self.out.rest.push(Command::Ask { peer: id.robot, request: FactsRequest { ranges: vec![range] } });
+    }
+
+    fn peer_status(&mut self, status: &Status) {
+        if status.robot == self.config.robot {
+            return;
+        }
+        if status.configuration != self.ledger.configuration() {
+            let (theirs, ours) = (status.configuration, self.ledger.configuration());
+            self.notice(Notice::OtherConfiguration { robot: status.robot, theirs, ours });
+            return;
+        }
+        let held: BTreeMap<LogId, _> = self.ledger.digests().map(|digest| (digest.log, digest)).collect();
+        let mut ranges = Vec::new();
+        for theirs in &status.logs {
+            if theirs.log.robot == self.config.robot {
+                self.known_boot = self.known_boot.max(Some(theirs.log.boot));
+                if self.boot == Some(theirs.log.boot) {
+                    continue;
+                }
+            }
+            let ours = held.get(&theirs.log);
+            let from = ours.map_or(0, |ours| ours.held);
+            if theirs.held > from {
+                ranges.push(LogRange { log: theirs.log, from, to: theirs.held });
+            } else if ours.is_some_and(|ours| ours.held == theirs.held && ours.chain != theirs.chain) {
+                self.notice(Notice::Fork { log: theirs.log, peer: status.robot });
+            }
+        }
+        if !ranges.is_empty() {
+            self.out.rest.push(Command::Ask { peer: status.robot, request: FactsRequest { ranges } });
+        }
+    }
+
+    fn end_input(&mut self) {
+        self.input_ended = true;
+        for sample in std::mem::take(&mut self.waiting) {
+            self.counts.refuse(&SampleRefusal::AfterLastOdometry { time: sample.time });
+        }
+        self.answer();
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.out.rest.push(Command::Notice(notice));
+    }
+
+    /// Says something in this robot's own log.
+    fn say(&mut self, boot: BootIndex, body: Body) {
+        let log = LogId { robot: self.config.robot, boot };
+        let sequence = Sequence(self.ledger.log(log).map_or(0, pleiad_estimation::ledger::Log::held));
+        let id = EntryId { robot: log.robot, boot, sequence };
+        let entry = Entry { id, body, extension: Vec::new() };
+        // The own log has no gap and no second author: this always extends it.
+        self.ledger.insert(entry.clone());
+        self.out.records.push(Record::Entry(entry.clone()));
+        self.out.entries.push(entry);
+    }
+
+    /// A boot begins at `time`: at the first odometry of this start, and after every gap of the odometry.
+    fn begin_boot(&mut self, time: Timestamp) {
+        let index = self.known_boot.map_or(BootIndex(0), |known| BootIndex(known.0 + 1));
+        let continuation = self.segments.last().map(|(previous, trajectory)| {
+            let (end, last) = trajectory.end();
+            let gap_s = time.seconds_since(end);
+            let [x, y, yaw] = self.config.motion_limits.map(|limit| (limit * gap_s).powi(2));
+            Continuation { previous, time: end, last, gap: Symmetric3::diagonal(x, y, yaw) }
+        });
+        let prior = self.config.prior.filter(|prior| continuation.is_none() && prior.for_boot == index.0);
+        // The nominal trajectory begins where the last one ended, so that `odom` has no jump; the first
+        // one at the prior, so that it reads as dead reckoning in the map.
+        let nominal = match (&continuation, &self.config.prior) {
+            (Some(continuation), _) => continuation.last.nominal,
+            (None, Some(prior)) => prior.pose,
+            (None, None) => Pose2::identity(),
+        };
+        self.boot = Some(index);
+        self.known_boot = Some(index);
+        self.segments.begin(index, time, nominal, self.config.history_samples);
+        let nonce = self.nonce.wrapping_add(u64::from(index.0));
+        let configuration = self.ledger.configuration();
+        self.say(index, Body::Boot(Boot { time, nonce, configuration, nominal, continuation }));
+        self.say(index, Body::ClockMap(self.config.clock));
+        for (profile, noise) in (0u16..).zip(self.config.sensors.profiles()) {
+            if let Some(noise) = noise {
+                self.say(index, Body::Profile(Profile { index: profile, noise }));
+            }
+        }
+        if let Some(prior) = prior
+            && let Ok(observer) = self.segments.current(time)
+        {
+            let quantity = Quantity::Absolute(Absolute::Pose(prior.pose));
+            let noise = NoiseRef::Explicit(prior.noise);
+            self.say(index, Body::Observation(Observation { time, quantity, noise, observer }));
+        } else if continuation.is_none() {
+            self.notice(Notice::NoPrior { boot: index });
+        }
+    }
+
+    /// Makes a fact of an own observation that the odometry has reached.
+    fn observe(&mut self, sample: &Sample) -> Result<(), SampleRefusal> {
+        let boot = self.boot.ok_or(SampleRefusal::BeforeBoot { time: sample.time })?;
+        let observer = self.segments.current(sample.time).map_err(|outside| match outside {
+            Outside::Before => SampleRefusal::BeforeBoot { time: sample.time },
+            Outside::Forgotten => SampleRefusal::TooOld { time: sample.time },
+            Outside::After => SampleRefusal::AfterLastOdometry { time: sample.time },
+        })?;
+        let (quantity, profile) = self.quantity(sample)?;
+        if self.config.sensors.profiles()[usize::from(profile)].is_none() {
+            return Err(SampleRefusal::NoNoise { kind: SensorsSection::profile_name(profile) });
+        }
+        let noise = NoiseRef::Profile(profile);
+        self.say(boot, Body::Observation(Observation { time: sample.time, quantity, noise, observer }));
+        Ok(())
+    }
+
+    /// Answers every observation that names this robot and can be answered now: exactly one answer each.
+    fn answer(&mut self) {
+        let Some(boot) = self.boot else { return };
+        let open: Vec<_> = self.ledger.unanswered(self.config.robot).collect();
+        for (observation, time) in open {
+            let answer = match self.segments.find(time) {
+                Ok((boot, state)) => Answer::State { boot, state },
+                Err(VoidReason::Clock) => {
+                    let end = self.segments.last().map_or(time, |(_, trajectory)| trajectory.end().0);
+                    if self.input_ended {
+                        // The odometry will never reach it.
+                        Answer::Void(VoidReason::OdometryGap)
+                    } else if time.seconds_since(end) > LARGEST_CLOCK_ERROR_S {
+                        Answer::Void(VoidReason::Clock)
+                    } else {
+                        continue;
+                    }
+                }
+                Err(reason) => Answer::Void(reason),
+            };
+            self.say(boot, Body::Half(Half { observation, answer }));
+        }
+    }
+}

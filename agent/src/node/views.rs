@@ -1,0 +1,132 @@
+//! What can be asked of a node: its estimate, its settled history, its status.
+
+use pleiad_estimation::Timestamp;
+use pleiad_estimation::fact::NominalState;
+use pleiad_estimation::ledger::FactCounts;
+use pleiad_estimation::symmetric::Symmetric3;
+use pleiad_estimation::{BootIndex, Pose2};
+use pleiad_protocol::{Estimate, LogStatus, SampleCounts, Status};
+
+use super::Node;
+
+/// One point of a settled trajectory: the estimate at a time on all facts up to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettledEstimate {
+    /// When.
+    pub time: Timestamp,
+    /// During which boot.
+    pub boot: BootIndex,
+    /// `map_from_robot`.
+    pub pose: Pose2,
+    /// Covariance of position in the map and yaw.
+    pub covariance: Symmetric3,
+    /// Dead reckoning from the prior: `odom_from_robot`.
+    pub nominal: Pose2,
+}
+
+impl Node {
+    /// The estimate at the last odometry, on the facts held now; `None` while the robot has no place in
+    /// the map.
+    pub fn estimate(&mut self) -> Option<Estimate> {
+        let (boot, trajectory) = self.segments.last()?;
+        let (time, state) = trajectory.end();
+        let joint = self.ledger.settle();
+        let member = joint.member(self.config.robot).filter(|member| member.boot == boot)?;
+        let map_from_odom = member.correction;
+        let (map_from_robot, covariance) = joint.estimate(self.config.robot, &state)?;
+        let [xx, _, yy, _, _, yaw] = covariance.0;
+        Some(Estimate {
+            robot: self.config.robot,
+            boot,
+            time,
+            map_from_odom,
+            odom_from_robot: state.nominal,
+            map_from_robot,
+            covariance,
+            sigma: [xx, yy, yaw].map(|variance| variance.max(0.0).sqrt()),
+            facts_used: self.ledger.counts().used as u64,
+        })
+    }
+
+    /// The settled trajectory on the grid of estimate times.
+    pub fn settled(&self) -> Vec<SettledEstimate> {
+        let history = self.ledger.settled_history(self.config.robot);
+        let mut estimates = Vec::new();
+        for (boot, trajectory) in self.segments.iter() {
+            let rate = self.config.estimate_rate_hz;
+            #[allow(clippy::cast_possible_truncation, reason = "seconds times a rate")]
+            let cells = (
+                (trajectory.start().seconds() * rate).ceil() as i64,
+                (trajectory.end().0.seconds() * rate).floor() as i64,
+            );
+            for cell in cells.0..=cells.1 {
+                let time = Timestamp::from_seconds(cell as f64 / rate);
+                let Ok(state) = trajectory.at(time) else { continue };
+                let known = history.partition_point(|point| point.time <= time);
+                let Some(point) = known.checked_sub(1).map(|last| &history[last]) else { continue };
+                // A boot that began at this very instant has taken over.
+                if point.boot == boot {
+                    estimates.push(settled(time, boot, &state, point.estimate(&state)));
+                }
+            }
+        }
+        estimates
+    }
+
+    /// What this node holds and does: its digest for peers, its state for operators.
+    pub fn status(&mut self) -> Status {
+        let estimate = self.ledger.fingerprint();
+        let logs = self.ledger.digests().filter(|digest| digest.held > 0);
+        let logs: Vec<_> = logs
+            .map(|digest| LogStatus { log: digest.log, held: digest.held, chain: digest.chain })
+            .collect();
+        let FactCounts { relative, absolute, used, rejected, pending, void, .. } = self.ledger.counts();
+        let count = |count: usize| count as u64;
+        Status {
+            robot: self.config.robot,
+            boot: self.boot.unwrap_or_default(),
+            configuration: self.ledger.configuration(),
+            logs,
+            facts: pleiad_protocol::FactCounts {
+                relative: count(relative),
+                absolute: count(absolute),
+                used: count(used),
+                rejected: count(rejected),
+                pending: count(pending),
+                void: count(void),
+            },
+            estimate,
+            odometry_until: self.segments.last().map(|(_, trajectory)| trajectory.end().0),
+            samples: SampleCounts { accepted: self.counts.accepted, refused: self.counts.refused },
+            input_ended: self.input_ended,
+            drained: self.drained(),
+        }
+    }
+
+    /// Whether nothing is left to be done here: the input has ended and every observation that names this
+    /// robot is answered.
+    pub fn drained(&self) -> bool {
+        self.input_ended
+            && self.waiting.is_empty()
+            && self.ledger.unanswered(self.config.robot).next().is_none()
+    }
+
+    /// Why samples were refused, and how often.
+    pub fn refusals(&self) -> impl Iterator<Item = (&str, u64)> {
+        self.counts.reasons.iter().map(|(reason, count)| (reason.as_str(), *count))
+    }
+
+    /// Distance travelled by dead reckoning, m.
+    pub fn distance_m(&self) -> f64 {
+        self.segments.iter().map(|(_, trajectory)| trajectory.distance_m()).sum()
+    }
+}
+
+fn settled(
+    time: Timestamp,
+    boot: BootIndex,
+    state: &NominalState,
+    (pose, covariance): (Pose2, Symmetric3),
+) -> SettledEstimate {
+    SettledEstimate { time, boot, pose, covariance, nominal: state.nominal }
+}

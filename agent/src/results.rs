@@ -1,0 +1,242 @@
+//! What an agent leaves behind: its trajectories, online and settled, and a summary.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use pleiad_estimation::symmetric::Symmetric3;
+use pleiad_estimation::{BootIndex, Pose2, Timestamp};
+use pleiad_protocol::Estimate;
+use serde::{Deserialize, Serialize};
+
+use crate::node::{Node, SettledEstimate};
+
+/// First line of the files of estimates.
+pub const COLUMNS: &str =
+    "t_ns,boot,x_m,y_m,yaw_rad,xx,yx,yy,yawx,yawy,yawyaw,odom_x_m,odom_y_m,odom_yaw_rad";
+
+/// Name of the file of settled estimates.
+pub const SETTLED: &str = "settled.csv";
+/// Name of the file of online estimates.
+pub const ONLINE: &str = "online.csv";
+/// Name of the summary.
+pub const SUMMARY: &str = "agent.json";
+
+/// Why results could not be written or read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ResultsError {
+    /// The file system refused.
+    #[error("{path}: {cause}")]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// A line is not what this version writes.
+    #[error("{path}:{line}: found {found:?}, expected {COLUMNS}")]
+    Line {
+        /// Which file.
+        path: PathBuf,
+        /// From 1.
+        line: usize,
+        /// The line.
+        found: String,
+    },
+    /// The summary is not what this version writes.
+    #[error("{path}: {cause}")]
+    Summary {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong.
+        cause: serde_json::Error,
+    },
+}
+
+/// What an agent did, in numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AgentSummary {
+    /// Who.
+    pub robot: u32,
+    /// Hash of the bits of its final estimate of the whole team.
+    pub estimate: String,
+    /// Complete relative observations known.
+    pub facts_relative: u64,
+    /// Absolute ones.
+    pub facts_absolute: u64,
+    /// Used in the estimate.
+    pub facts_used: u64,
+    /// Rejected by the gate.
+    pub facts_rejected: u64,
+    /// Waiting for a half.
+    pub facts_pending: u64,
+    /// Answered with a reason.
+    pub facts_void: u64,
+    /// Samples taken.
+    pub samples_accepted: u64,
+    /// Samples refused, by reason.
+    pub samples_refused: std::collections::BTreeMap<String, u64>,
+    /// Messages published or answered.
+    pub messages: u64,
+    /// Their bytes: entries, digests, estimates, resends.
+    pub bytes: u64,
+    /// Path length by dead reckoning, m.
+    pub distance_m: f64,
+    /// Boots of this robot known at the end.
+    pub boots: u32,
+}
+
+/// The online view of an estimate in the form of a settled one.
+pub fn online(estimate: &Estimate) -> SettledEstimate {
+    SettledEstimate {
+        time: estimate.time,
+        boot: estimate.boot,
+        pose: estimate.map_from_robot,
+        covariance: estimate.covariance,
+        nominal: estimate.odom_from_robot,
+    }
+}
+
+/// Fills a summary from a node; messages and bytes are the driver's to know.
+pub fn summary(node: &mut Node, messages: u64, bytes: u64) -> AgentSummary {
+    let status = node.status();
+    AgentSummary {
+        robot: status.robot.0,
+        estimate: status.estimate.to_string(),
+        facts_relative: status.facts.relative,
+        facts_absolute: status.facts.absolute,
+        facts_used: status.facts.used,
+        facts_rejected: status.facts.rejected,
+        facts_pending: status.facts.pending,
+        facts_void: status.facts.void,
+        samples_accepted: status.samples.accepted,
+        samples_refused: node.refusals().map(|(reason, count)| (reason.to_owned(), count)).collect(),
+        messages,
+        bytes,
+        distance_m: node.distance_m(),
+        boots: status.boot.0 + 1,
+    }
+}
+
+/// Writes settled and online estimates and the summary into a folder.
+///
+/// # Errors
+/// [`ResultsError::Io`].
+pub fn write(
+    folder: &Path,
+    settled: &[SettledEstimate],
+    online: &[SettledEstimate],
+    summary: &AgentSummary,
+) -> Result<(), ResultsError> {
+    std::fs::create_dir_all(folder).map_err(|cause| ResultsError::Io { path: folder.to_owned(), cause })?;
+    write_file(&folder.join(SETTLED), &table(settled))?;
+    write_file(&folder.join(ONLINE), &table(online))?;
+    let path = folder.join(SUMMARY);
+    let text = serde_json::to_string_pretty(summary)
+        .map_err(|cause| ResultsError::Summary { path: path.clone(), cause })?;
+    write_file(&path, &text)
+}
+
+/// Beside it first, then in its place: a reader never sees half a file.
+fn write_file(path: &Path, text: &str) -> Result<(), ResultsError> {
+    let io = |cause| ResultsError::Io { path: path.to_owned(), cause };
+    let part = path.with_extension("part");
+    std::fs::write(&part, text).map_err(io)?;
+    std::fs::rename(&part, path).map_err(io)
+}
+
+/// Numbers by their shortest exact digits, so that equal bits give equal files.
+fn table(estimates: &[SettledEstimate]) -> String {
+    let mut text = String::with_capacity(estimates.len() * 220 + 100);
+    text.push_str(COLUMNS);
+    text.push('\n');
+    for estimate in estimates {
+        let (p, n) = (&estimate.pose, &estimate.nominal);
+        let numbers = [p.x_m(), p.y_m(), p.yaw_rad()].into_iter().chain(estimate.covariance.0).chain([
+            n.x_m(),
+            n.y_m(),
+            n.yaw_rad(),
+        ]);
+        let _ = write!(text, "{},{}", estimate.time.0, estimate.boot);
+        for number in numbers {
+            let _ = write!(text, ",{number:?}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Reads a file of estimates.
+///
+/// # Errors
+/// [`ResultsError`], with file and line.
+pub fn read_estimates(path: &Path) -> Result<Vec<SettledEstimate>, ResultsError> {
+    let text =
+        std::fs::read_to_string(path).map_err(|cause| ResultsError::Io { path: path.to_owned(), cause })?;
+    let bad = |line: usize, found: &str| ResultsError::Line {
+        path: path.to_owned(),
+        line: line + 1,
+        found: found.to_owned(),
+    };
+    let mut lines = text.lines().enumerate();
+    match lines.next() {
+        Some((_, COLUMNS)) => {}
+        other => return Err(bad(0, other.map_or("", |(_, line)| line))),
+    }
+    lines.map(|(number, line)| parse(line).ok_or_else(|| bad(number, line))).collect()
+}
+
+fn parse(line: &str) -> Option<SettledEstimate> {
+    let mut fields = line.split(',');
+    let time = Timestamp(fields.next()?.parse().ok()?);
+    let boot = BootIndex(fields.next()?.parse().ok()?);
+    let numbers: Vec<f64> = fields.map(|field| field.parse().ok()).collect::<Option<_>>()?;
+    let [x, y, yaw, c @ .., nx, ny, nyaw] = numbers.as_slice() else { return None };
+    Some(SettledEstimate {
+        time,
+        boot,
+        pose: Pose2::new(*x, *y, *yaw),
+        covariance: Symmetric3(c.try_into().ok()?),
+        nominal: Pose2::new(*nx, *ny, *nyaw),
+    })
+}
+
+/// Reads an agent's summary.
+///
+/// # Errors
+/// [`ResultsError`].
+pub fn read_summary(folder: &Path) -> Result<AgentSummary, ResultsError> {
+    let path = folder.join(SUMMARY);
+    let text =
+        std::fs::read_to_string(&path).map_err(|cause| ResultsError::Io { path: path.clone(), cause })?;
+    serde_json::from_str(&text).map_err(|cause| ResultsError::Summary { path, cause })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn estimates_read_back_to_the_same_bits() {
+        let estimate = SettledEstimate {
+            time: Timestamp(1_248_273_546_275_000_001),
+            boot: BootIndex(2),
+            pose: Pose2::new(0.1 + 0.2, -1e-17, 3.0),
+            covariance: Symmetric3([1.0 / 3.0, -0.0, 2.0, 1e-300, 5.5, 7.0]),
+            nominal: Pose2::new(-4.0, 1e10, -3.0),
+        };
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), &[estimate], &[], &AgentSummary::default()).unwrap();
+        assert_eq!(read_estimates(&folder.path().join(SETTLED)).unwrap(), [estimate]);
+        assert_eq!(read_estimates(&folder.path().join(ONLINE)).unwrap(), []);
+        assert_eq!(read_summary(folder.path()).unwrap(), AgentSummary::default());
+    }
+
+    #[test]
+    fn a_damaged_line_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(SETTLED);
+        std::fs::write(&path, format!("{COLUMNS}\n1,0,1,2,3\n")).unwrap();
+        assert!(matches!(read_estimates(&path).unwrap_err(), ResultsError::Line { line: 2, .. }));
+    }
+}
