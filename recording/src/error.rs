@@ -28,10 +28,7 @@ pub enum RecordingError {
         found: String,
     },
     /// A row that cannot be read.
-    #[error(
-        "{}:{line}: found `{found}`, expected {expected}; repair or remove the line, or read with bad rows \
-         skipped", file.display()
-    )]
+    #[error("{}:{line}: found `{found}`, expected {expected}; {remedy}", file.display())]
     BadRow {
         /// The file.
         file: PathBuf,
@@ -41,6 +38,8 @@ pub enum RecordingError {
         found: String,
         /// What should be there.
         expected: String,
+        /// What to do.
+        remedy: &'static str,
     },
     /// A file whose header, or lack of one, leaves its columns unknown.
     #[error("{}:{line}: found header `{found}`, expected {expected}; write the header line", file.display())]

@@ -8,6 +8,9 @@ use crate::report::{FileReport, Form, IngestReport, SkippedRow};
 use crate::table::{Row, Table, shown};
 use crate::tidy::{Stamped, tidy};
 
+/// What a user can do about a bad row.
+const REMEDY: &str = "repair or remove the line, or read with bad rows skipped";
+
 /// How damaged input is treated.
 ///
 /// Whatever the options, in each channel
@@ -67,7 +70,7 @@ impl<'a> Ingest<'a> {
                 Ok(None) => {}
                 Err(expected) => {
                     if !self.options.skip_bad_rows {
-                        return Err(table.bad_row(line, expected));
+                        return Err(table.bad_row(line, expected, REMEDY));
                     }
                     report.skip(SkippedRow { line, found: shown(text), expected });
                 }

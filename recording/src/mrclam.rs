@@ -68,7 +68,7 @@ fn read_landmarks(ingest: &mut Ingest<'_>) -> Result<BTreeMap<LandmarkId, [f64; 
     };
     ingest.map(
         &table,
-        |row, _| Ok((LandmarkId(row.identifier(0, 'L')?), [row.number(1)?, row.number(2)?])),
+        |row, _| Ok((LandmarkId(row.identifier(0, None)?), [row.number(1)?, row.number(2)?])),
         |landmark, line| format!("landmark {landmark} stands in line {line} already"),
     )
 }
@@ -84,7 +84,7 @@ fn read_barcodes(ingest: &mut Ingest<'_>) -> Result<BTreeMap<u32, u32>, Recordin
     };
     let by_subject = ingest.map(
         &table,
-        |row, line| Ok((row.identifier(0, 'S')?, (row.identifier(1, 'B')?, line))),
+        |row, line| Ok((row.identifier(0, None)?, (row.identifier(1, None)?, line))),
         |subject, line| format!("subject {subject} stands in line {line} already"),
     )?;
     let mut by_barcode = BTreeMap::new();
@@ -146,7 +146,7 @@ fn read_sightings(
     let mut unknown_barcodes: BTreeMap<u32, usize> = BTreeMap::new();
     let (mut rows, mut report) = ingest.rows(&table, |row, _| {
         let time: Timestamp = row.time(0)?;
-        let barcode = row.identifier(1, 'B')?;
+        let barcode = row.identifier(1, None)?;
         let relative = Relative::RangeBearing { range_m: row.distance(2)?, bearing_rad: row.number(3)? };
         let Some(&subject) = subjects.get(&barcode) else {
             *unknown_barcodes.entry(barcode).or_default() += 1;

@@ -115,6 +115,13 @@ pub(crate) fn push_time(text: &mut String, time: Timestamp) {
     let _ = write!(text, "{sign}{}.{:09}", nanos / NANOS_PER_SECOND, nanos % NANOS_PER_SECOND);
 }
 
+/// `time` in seconds, exactly: through a double, Unix times would be some nanoseconds off.
+pub(crate) fn time_text(time: Timestamp) -> String {
+    let mut text = String::new();
+    push_time(&mut text, time);
+    text
+}
+
 /// Appends `value` by the shortest digits that read back to the same bits.
 pub(crate) fn push_number(text: &mut String, value: f64) {
     // Writing to a string cannot fail.

@@ -6,6 +6,8 @@ use std::fmt;
 use pleiad_estimation::Timestamp;
 use serde::{Serialize, Serializer};
 
+use crate::number::time_text;
+
 /// Skipped rows are listed up to this many per file; the rest are only counted.
 const LISTED_ROWS: usize = 5;
 
@@ -168,7 +170,7 @@ impl fmt::Display for IngestReport {
         self.line(f, "gaps longer than 5 median periods", |file| file.gaps.count)?;
         let longest = self.files.iter().max_by(|a, b| a.gaps.largest_s.total_cmp(&b.gaps.largest_s));
         if let Some((file, at)) = longest.and_then(|file| Some((file, file.gaps.at?))) {
-            write!(f, "; the longest {:.3} s, in {} from {at}", file.gaps.largest_s, file.file)?;
+            write!(f, "; the longest {:.3} s, in {} from {}", file.gaps.largest_s, file.file, time_text(at))?;
         }
         self.warnings.iter().try_for_each(|warning| write!(f, "\n  warning: {warning}"))
     }

@@ -138,8 +138,9 @@ impl Table {
     }
 
     /// The error of a row that is not what was `expected`.
-    pub(crate) fn bad_row(&self, line: usize, expected: String) -> RecordingError {
-        RecordingError::BadRow { file: self.path.clone(), line, found: self.shown_line(line), expected }
+    pub(crate) fn bad_row(&self, line: usize, expected: String, remedy: &'static str) -> RecordingError {
+        let (file, found) = (self.path.clone(), self.shown_line(line));
+        RecordingError::BadRow { file, line, found, expected, remedy }
     }
 
     /// The error of a line that clashes with an earlier one.
@@ -225,13 +226,16 @@ impl<'t> Row<'t> {
         parse_time(self.cell(column)).ok_or_else(|| self.expected(column, "a time in seconds"))
     }
 
-    /// A number of a robot, landmark, subject or barcode, with or without the letter `prefix`.
-    pub(crate) fn identifier(&self, column: usize, prefix: char) -> Result<u32, String> {
+    /// A number of a robot, landmark, subject or barcode, with or without the letter that may precede it.
+    pub(crate) fn identifier(&self, column: usize, letter: Option<char>) -> Result<u32, String> {
         let text = str_or_empty(self.cell(column));
-        let number = text.strip_prefix(prefix).unwrap_or(text);
+        let number = letter.and_then(|letter| text.strip_prefix(letter)).unwrap_or(text);
         let digits = number.bytes().all(|byte| byte.is_ascii_digit());
         let parsed = if digits { number.parse().ok() } else { None };
-        parsed.ok_or_else(|| self.expected(column, &format!("a number such as `{prefix}2` or `2`")))
+        parsed.ok_or_else(|| match letter {
+            Some(letter) => self.expected(column, &format!("a number such as `{letter}2` or `2`")),
+            None => self.expected(column, "a whole number"),
+        })
     }
 
     /// The text of a cell.

@@ -8,7 +8,7 @@ use pleiad_estimation::{Pose2, Timestamp};
 
 use crate::error::RecordingError;
 use crate::folder::write_whole;
-use crate::number::{push_number, push_time};
+use crate::number::{push_number, push_time, time_text};
 use crate::table::{Row, Table};
 
 const COLUMNS: [&str; 8] = ["t", "x", "y", "z", "qx", "qy", "qz", "qw"];
@@ -25,7 +25,7 @@ pub fn write(path: &Path, trajectory: &[(Timestamp, Pose2)]) -> Result<(), Recor
     let mut text = String::with_capacity(trajectory.len() * 100);
     for (time, pose) in trajectory {
         if !pose.is_finite() {
-            let reason = format!("the pose at {time} is not finite");
+            let reason = format!("the pose at {} s is not finite", time_text(*time));
             return Err(RecordingError::Unwritable { reason });
         }
         // Sine and cosine come from the pose, whose functions give the same bits on every machine.
@@ -61,10 +61,10 @@ pub fn read(path: &Path) -> Result<Vec<(Timestamp, Pose2)>, RecordingError> {
             table.row(text, &mut cells).and_then(|row| pose(&row)).and_then(|(time, pose)| match trajectory
                 .last()
             {
-                Some((before, _)) if *before >= time => Err(format!("a stamp after {before}")),
+                Some((before, _)) if *before >= time => Err(format!("a stamp after {}", time_text(*before))),
                 _ => Ok((time, pose)),
             });
-        trajectory.push(read.map_err(|expected| table.bad_row(line, expected))?);
+        trajectory.push(read.map_err(|expected| table.bad_row(line, expected, "repair or remove the line"))?);
     }
     Ok(trajectory)
 }

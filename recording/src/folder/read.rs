@@ -41,7 +41,7 @@ pub fn read_folder(
     if let Some(table) = Table::open_csv(folder, LANDMARKS, &LANDMARK_COLUMNS, &[])? {
         recording.landmarks = ingest.map(
             &table,
-            |row, _| Ok((LandmarkId(row.identifier(0, 'L')?), [row.number(1)?, row.number(2)?])),
+            |row, _| Ok((LandmarkId(row.identifier(0, Some('L'))?), [row.number(1)?, row.number(2)?])),
             |landmark, line| format!("landmark {landmark} stands in line {line} already"),
         )?;
     } else {

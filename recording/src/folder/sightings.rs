@@ -93,8 +93,8 @@ pub(super) fn layout_of(table: &Table) -> Result<Layout, String> {
 /// Who was seen in a row.
 pub(super) fn target(row: &Row<'_>) -> Result<Target, String> {
     match row.text(TARGET_KIND) {
-        "robot" => Ok(Target::Robot(RobotId(row.identifier(TARGET_ID, 'r')?))),
-        "landmark" => Ok(Target::Landmark(LandmarkId(row.identifier(TARGET_ID, 'L')?))),
+        "robot" => Ok(Target::Robot(RobotId(row.identifier(TARGET_ID, Some('r'))?))),
+        "landmark" => Ok(Target::Landmark(LandmarkId(row.identifier(TARGET_ID, Some('L'))?))),
         other => Err(format!("`robot` or `landmark` in column `target_kind`, not `{other}`")),
     }
 }

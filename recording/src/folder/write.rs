@@ -14,7 +14,7 @@ use super::{
 };
 use crate::error::RecordingError;
 use crate::nominal::nominal_text;
-use crate::number::{push_number, push_time};
+use crate::number::{push_number, push_time, time_text};
 use crate::open::forms_of;
 use crate::report::Form;
 use crate::tidy::Stamped;
@@ -68,8 +68,8 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), RecordingError>
     std::fs::rename(&partial, path).map_err(RecordingError::io("write", path))
 }
 
-/// Removes the files of the recording in `folder`, the manifest first: what is left of an interrupted
-/// removal is then no longer vouched for.
+/// Removes the files of the recording in `folder`, the manifest last: what an interrupted removal leaves
+/// then misses files that are listed, and is refused.
 fn clear(folder: &Path) -> Result<(), RecordingError> {
     let remove = |file: &str| {
         let path = folder.join(file);
@@ -80,9 +80,6 @@ fn clear(folder: &Path) -> Result<(), RecordingError> {
             _ => Ok(()),
         }
     };
-    for file in [manifest::FILE, NOMINAL, LANDMARKS] {
-        remove(file)?;
-    }
     for robot in robots_of(folder)? {
         for channel in CHANNELS {
             remove(&channel.file(robot))?;
@@ -93,10 +90,14 @@ fn clear(folder: &Path) -> Result<(), RecordingError> {
             std::fs::remove_dir(&path).map_err(RecordingError::io("remove", &path))?;
         }
     }
+    for file in [NOMINAL, LANDMARKS, manifest::FILE] {
+        remove(file)?;
+    }
     Ok(())
 }
 
-/// All files with their texts, the manifest last.
+/// All files with their texts, the manifest first: it lists the channels, so that a folder whose writing
+/// was interrupted misses some and is refused.
 fn render(recording: &Recording) -> Result<Vec<(String, String)>, String> {
     if recording.robots.is_empty() {
         return Err("it has no robot".to_owned());
@@ -130,7 +131,7 @@ fn render(recording: &Recording) -> Result<Vec<(String, String)>, String> {
         }
         manifest.rows.insert(robot, rows);
     }
-    files.push((manifest::FILE.to_owned(), manifest.text()));
+    files.insert(0, (manifest::FILE.to_owned(), manifest.text()));
     Ok(files)
 }
 
@@ -272,7 +273,7 @@ fn foreign(channel: Channel, time: Timestamp) -> String {
 }
 
 fn at(channel: Channel, time: Timestamp, what: &str) -> String {
-    format!("{} at {time}: {what}", channel.name)
+    format!("{} at {} s: {what}", channel.name, time_text(time))
 }
 
 /// Appends the name of a landmark as the map has it: `L07`.

@@ -118,7 +118,7 @@ fn impossible_sightings_are_bad_rows() {
     for (row, expected) in [
         ("1248444190 5 1.0 0.0", "another subject than robot 1 itself, whose barcode is 5"),
         ("1248444190 63 -1.0 0.0", "a distance that is not negative in column `range`, not `-1.0`"),
-        ("1248444190 6.3 1.0 0.0", "in column `barcode`, not `6.3`"),
+        ("1248444190 6.3 1.0 0.0", "a whole number in column `barcode`, not `6.3`"),
     ] {
         let folder = clean();
         folder.append("Robot1_Measurement.dat", &format!("{row}\n"));

@@ -118,6 +118,35 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn of_arbitrary_bytes_every_row_is_accounted_for(
+        cells in proptest::collection::vec("[0-9.,\n\r#eE+\\-naif \u{0}\u{e9}]{0,12}", 0..20),
+        tail in proptest::collection::vec(any::<u8>(), 0..40),
+    ) {
+        let folder = Folder::new(&[("r1/velocity.csv", "")]);
+        let mut bytes = format!("t,v,w\n1,2,3\n{}", cells.join(",")).into_bytes();
+        bytes.extend(tail);
+        fs::write(folder.path().join("r1/velocity.csv"), bytes).expect("written");
+        let report = read_with(&folder, ReadOptions { skip_bad_rows: true }).1;
+        let file = report.file("r1/velocity.csv").expect("read");
+        prop_assert_eq!(file.rows, file.kept + file.skipped + file.duplicates + file.conflicts);
+    }
+}
+
+#[test]
+fn an_interrupted_write_is_refused_when_read() {
+    let folder = Folder::new(&[]);
+    let mut recording = small();
+    recording.robots.insert(RobotId(2), recording.robots[&RobotId(1)].clone());
+    write_folder(&recording, folder.path(), Overwrite::Refuse).expect("writable");
+    fs::remove_dir_all(folder.path().join("r2")).expect("the last robot was not yet written");
+    let error = open(folder.path(), &ReadOptions::default()).expect_err("incomplete");
+    assert!(error.to_string().contains("recording.toml lists robot 2"), "{error}");
+}
+
 fn small() -> Recording {
     let reading = Reading::Velocity { forward_m_s: 0.1, yaw_rate_rad_s: 0.2 };
     let robot = RobotRecording {
