@@ -1,8 +1,31 @@
 //! A recording in memory, and the readers and writers of its forms: the recording folder, the MRCLAM
 //! folder, TUM trajectories.
+//!
+//! [`open`] tells the forms apart by what a folder holds and returns the recording together with an
+//! [`IngestReport`]: whatever was dropped, reordered or missing is counted there. Damaged input is an
+//! error naming file and line unless [`ReadOptions::skip_bad_rows`] is set.
 
+mod error;
+mod folder;
+mod ingest;
+mod mrclam;
+mod nominal;
+mod number;
+mod open;
+mod report;
+mod table;
+mod tidy;
+pub mod tum;
 mod types;
+mod view;
 
+pub use error::RecordingError;
+pub use folder::{FORMAT_VERSION, Overwrite, read_folder, write_folder};
+pub use ingest::ReadOptions;
+pub use mrclam::read_mrclam;
+pub use nominal::{read_nominal, write_nominal};
+pub use open::open;
+pub use report::{FileReport, Form, Gaps, IngestReport, SkippedRow};
 pub use types::{
     Command, Nominal, NominalNoise, NominalRangeSensor, NominalRobot, Recording, RobotRecording, TruthSample,
 };
