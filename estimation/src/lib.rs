@@ -10,7 +10,10 @@
 pub mod fact;
 pub mod geometry;
 pub mod identity;
+pub mod observability;
+pub mod reference;
 pub mod sample;
+pub mod statistics;
 pub mod symmetric;
 
 pub use geometry::Pose2;
