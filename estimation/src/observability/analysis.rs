@@ -103,16 +103,18 @@ impl Observability {
         tolerance: f64,
     ) -> Self {
         let states = 3 * robots.len();
-        // Zero rows make the decomposition give a full basis of the state space.
-        let padded = matrix.clone().resize_vertically(matrix.nrows().max(states), 0.0);
-        let svd = SVD::new(padded, false, true);
-        let mut directions: Vec<(f64, DVector<f64>)> = svd
-            .v_t
-            .iter()
-            .flat_map(|v_t| v_t.row_iter().map(|row| row.transpose()).collect::<Vec<_>>())
-            .zip(svd.singular_values.iter())
-            .map(|(direction, value)| (*value, direction))
-            .collect();
+        // The decomposition refuses an empty matrix.
+        let mut directions: Vec<(f64, DVector<f64>)> = Vec::with_capacity(states);
+        if states > 0 {
+            // Zero rows make the decomposition give a full basis of the state space.
+            let padded = matrix.clone().resize_vertically(matrix.nrows().max(states), 0.0);
+            let svd = SVD::new(padded, false, true);
+            for (value, direction) in
+                svd.singular_values.iter().zip(svd.v_t.iter().flat_map(|v| v.row_iter()))
+            {
+                directions.push((*value, direction.transpose()));
+            }
+        }
         directions.sort_by(|a, b| b.0.total_cmp(&a.0));
         let largest = directions.first().map_or(0.0, |(value, _)| *value);
         let rank =

@@ -79,14 +79,20 @@ pub(super) fn describe(
 ) -> Vec<String> {
     let mut remainder = Remainder { null_space, named: Vec::new() };
     let mut by_team: Vec<Vec<String>> = Vec::new();
-    for team in teams(robots.len()) {
-        if remainder.left() == 0 {
-            break;
+    let teams = teams(robots.len());
+    // Rotations about points elsewhere come last: where a robot of the team is free to turn by itself,
+    // the others can turn about it, which is better told as a rotation of all.
+    for elsewhere in [false, true] {
+        for team in &teams {
+            if remainder.left() == 0 {
+                break;
+            }
+            by_team.push(match (elsewhere, team.as_slice()) {
+                (true, _) => rotation_elsewhere(robots, team, &mut remainder),
+                (false, [index]) => single(robots, coordinates, *index, &mut remainder),
+                (false, _) => several(robots, team, &mut remainder),
+            });
         }
-        by_team.push(match team.as_slice() {
-            [index] => single(robots, coordinates, *index, &mut remainder),
-            _ => several(robots, &team, &mut remainder),
-        });
     }
     let mut words: Vec<String> = by_team.into_iter().rev().flatten().collect();
     words.extend(combinations(robots, &remainder));
@@ -117,10 +123,19 @@ fn several(robots: &[RobotId], team: &[usize], remainder: &mut Remainder<'_>) ->
     }
     if remainder.take(&common(robots.len(), team, 2)) {
         words.push(format!("common rotation{of}"));
-    } else if let Some(centre) = remainder.take_rotation(robots.len(), team) {
-        words.push(format!("common rotation{of} about ({:.2}, {:.2})", centre.x, centre.y));
     }
     words
+}
+
+/// A rotation about a point that is neither the robot's own nor free.
+fn rotation_elsewhere(robots: &[RobotId], team: &[usize], remainder: &mut Remainder<'_>) -> Vec<String> {
+    let Some(centre) = remainder.take_rotation(robots.len(), team) else { return Vec::new() };
+    let of = match team {
+        [index] => format!("rotation of robot {}", robots[*index]),
+        _ if team.len() == robots.len() => "common rotation".to_owned(),
+        _ => format!("common rotation of robots {}", list(robots, team)),
+    };
+    vec![format!("{of} about ({:.2}, {:.2})", centre.x, centre.y)]
 }
 
 /// Every robot of a team moved alike along one coordinate of its error.
@@ -160,8 +175,6 @@ fn single(
     }
     if remainder.take(&turn) {
         words.push(format!("heading of robot {robot}"));
-    } else if let Some(centre) = remainder.take_rotation(robots.len(), &[index]) {
-        words.push(format!("rotation of robot {robot} about ({:.2}, {:.2})", centre.x, centre.y));
     }
     words
 }

@@ -111,7 +111,7 @@ impl JointCovariance {
         let Some(cholesky) = Cholesky::new(innovation) else { return skipped(SkipReason::Indefinite) };
         let nis = linearized.residual.dot(&cholesky.solve(&linearized.residual));
         if nis > threshold {
-            return (Outcome::Rejected { nis, threshold }, Vec::new());
+            return (Outcome::Rejected { nis, dimension: rows, threshold }, Vec::new());
         }
         // K = P H^T S^-1, from S K^T = H P.
         let gain = cholesky.solve(&(&h * &self.matrix)).transpose();
@@ -125,7 +125,7 @@ impl JointCovariance {
                 Vector3::new(correction[3 * index], correction[3 * index + 1], correction[3 * index + 2]),
             )
         });
-        (Outcome::Used { nis }, corrections.collect())
+        (Outcome::Used { nis, dimension: rows }, corrections.collect())
     }
 
     fn symmetrize(&mut self) {

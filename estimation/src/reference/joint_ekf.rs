@@ -82,6 +82,23 @@ impl JointEstimate {
         self.records.iter().find(|record| record.id == id).map(|record| record.outcome)
     }
 
+    /// NIS and dimension of every fact that came before the gate, used and rejected.
+    pub fn nis(&self) -> impl Iterator<Item = (f64, usize)> + '_ {
+        self.records.iter().filter_map(|record| record.outcome.nis())
+    }
+
+    /// The facts whose NIS is within a share `tolerance` of the gate they were folded with: correct
+    /// implementations may decide them differently.
+    pub fn near_gate(&self, gate: &[f64; 3], tolerance: f64) -> Vec<EntryId> {
+        let near = |record: &&FactRecord| {
+            record.outcome.nis().is_some_and(|(nis, dimension)| {
+                let threshold = dimension.checked_sub(1).and_then(|index| gate.get(index));
+                threshold.is_some_and(|threshold| (nis - threshold).abs() <= tolerance * threshold)
+            })
+        };
+        self.records.iter().filter(near).map(|record| record.id).collect()
+    }
+
     /// Pose and covariance (in the form's coordinates) of a robot carried forward to a nominal state
     /// of its current boot.
     pub fn predict(&self, robot: RobotId, to: &NominalState) -> Option<(Pose2, Matrix3)> {

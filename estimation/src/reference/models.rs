@@ -31,16 +31,30 @@ pub enum Outcome {
     Used {
         /// `r^T S^-1 r`.
         nis: f64,
+        /// Length of `r`.
+        dimension: usize,
     },
     /// Turned away by the gate.
     Rejected {
         /// `r^T S^-1 r`.
         nis: f64,
+        /// Length of `r`.
+        dimension: usize,
         /// What it exceeded.
         threshold: f64,
     },
     /// Without effect on the estimate, or on nothing but the noise of its participants.
     Skipped(SkipReason),
+}
+
+impl Outcome {
+    /// NIS and dimension, of a fact that came before the gate.
+    pub fn nis(&self) -> Option<(f64, usize)> {
+        match self {
+            Self::Used { nis, dimension } | Self::Rejected { nis, dimension, .. } => Some((*nis, *dimension)),
+            Self::Boot | Self::Placed | Self::Skipped(_) => None,
+        }
+    }
 }
 
 /// Why a fact was skipped.

@@ -162,6 +162,10 @@ impl RoumeliotisBekey {
         if !fits {
             return Err(ReferenceError::Shape { rows });
         }
+        if let Some((stranger, _)) = participants.iter().find(|(robot, _)| !self.members.contains_key(robot))
+        {
+            return Err(ReferenceError::UnknownRobot(*stranger));
+        }
         let mut innovation_covariance = noise.clone();
         for (i, h_i) in participants {
             for (j, h_j) in participants {
