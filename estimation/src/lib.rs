@@ -16,7 +16,10 @@ pub mod ledger;
 pub mod measurement;
 pub mod motion;
 pub mod nominal;
+pub mod observability;
+pub mod reference;
 pub mod sample;
+pub mod statistics;
 pub mod symmetric;
 
 pub use geometry::Pose2;

@@ -43,7 +43,10 @@ pub enum Command {
 
 /// What is kept of a run: from the records of a journal, in order, a node recovers.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(clippy::large_enum_variant, reason = "records are short-lived and mostly entries where they are many")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "records are short-lived and mostly entries where they are many"
+)]
 pub enum Record {
     /// A sample of this robot, stamped in team time.
     Sample(Sample),
