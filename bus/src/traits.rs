@@ -69,6 +69,8 @@ pub enum BusError {
 /// A bus: publish and subscribe, ask and answer, announce and watch who is there. Keys are
 /// slash-separated; in expressions `*` stands for one segment, `**` for any number of them.
 ///
+/// A bus receives what it publishes itself, if it subscribes to it.
+///
 /// Publishing never blocks on a slow receiver: what does not fit is dropped, and the layer above repairs
 /// it. Receivers are channels, filled without any work in the transport's own threads.
 pub trait Bus: Send + Sync + 'static {
@@ -108,6 +110,10 @@ pub trait Bus: Send + Sync + 'static {
         expression: &str,
     ) -> impl Future<Output = Result<mpsc::Receiver<Liveliness>, BusError>> + Send;
 
-    /// Leaves the bus in bounded time.
+    /// Leaves the bus in bounded time: withdraws everything declared through it, ends its receivers and
+    /// makes every later operation an error.
     fn close(&self) -> impl Future<Output = ()> + Send;
+
+    /// How much has been dropped so far because a receiver of this bus did not take it in time.
+    fn dropped(&self) -> u64;
 }
