@@ -1,5 +1,7 @@
 //! The simulated world against closed forms, declared statistics and its own promises.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests are tests")]
+
 mod channels;
 mod motion;
 mod scenario_errors;
@@ -39,4 +41,34 @@ fn assert_uncorrelated(claim: &str, pairs: impl Iterator<Item = (f64, f64)>) {
     let count = products.len() as f64;
     let mean = products.iter().sum::<f64>() / count;
     assert!(mean.abs() < 4.5 / count.sqrt(), "{claim}: correlation {mean} over {count} pairs");
+}
+
+#[test]
+#[should_panic(expected = "chi-square")]
+fn a_sigma_off_by_a_tenth_is_caught() {
+    let alternating: Vec<f64> = (0..2000).map(|k| if k % 2 == 0 { 1.1 } else { -1.1 }).collect();
+    assert_standard("planted", &alternating);
+}
+
+#[test]
+#[should_panic(expected = "mean")]
+fn a_bias_of_a_fifth_of_a_sigma_is_caught() {
+    let alternating: Vec<f64> = (0..2000).map(|k| if k % 2 == 0 { 1.2 } else { -0.8 }).collect();
+    assert_standard("planted", &alternating);
+}
+
+#[test]
+#[should_panic(expected = "correlation")]
+fn a_correlation_of_a_fifth_is_caught() {
+    // The pairs cancel in turn but for every tenth, which is of one sign and adds 2.25.
+    let pairs = (0..2000).map(|k| {
+        if k % 10 == 0 {
+            (1.5, 1.5)
+        } else if k % 2 == 0 {
+            (1.0, 1.0)
+        } else {
+            (1.0, -1.0)
+        }
+    });
+    assert_uncorrelated("planted", pairs);
 }
