@@ -229,8 +229,11 @@ mod tests {
                     Value::String(text) => text.clone(),
                     other => other.to_string(),
                 };
-                let same_number =
-                    default.parse::<f64>().ok().zip(written.parse::<f64>().ok()).is_some_and(|(a, b)| a == b);
+                let same_number = default
+                    .parse::<f64>()
+                    .ok()
+                    .zip(written.parse::<f64>().ok())
+                    .is_some_and(|(a, b)| (a - b).abs() < 1e-12);
                 let pi = default == "pi" && value.as_float() == Some(std::f64::consts::PI);
                 assert!(same_number || pi || default == written, "{path}: guide {default}, code {written}");
             }

@@ -138,6 +138,3 @@ fn priors(scenario: &Scenario, starts: &BTreeMap<RobotId, Pose2>, seed: Seed) ->
 
 /// The map of a run.
 type Landmarks = BTreeMap<LandmarkId, [f64; 2]>;
-
-#[cfg(test)]
-mod tests;
