@@ -117,3 +117,54 @@ pub trait Bus: Send + Sync + 'static {
     /// How much has been dropped so far because a receiver of this bus did not take it in time.
     fn dropped(&self) -> u64;
 }
+
+/// A shared bus is a bus.
+impl<B: Bus> Bus for std::sync::Arc<B> {
+    type Token = B::Token;
+
+    fn publish(&self, key: &str, payload: Vec<u8>) -> impl Future<Output = Result<(), BusError>> + Send {
+        (**self).publish(key, payload)
+    }
+
+    fn subscribe(
+        &self,
+        expression: &str,
+    ) -> impl Future<Output = Result<mpsc::Receiver<Incoming>, BusError>> + Send {
+        (**self).subscribe(expression)
+    }
+
+    fn serve(
+        &self,
+        expression: &str,
+    ) -> impl Future<Output = Result<mpsc::Receiver<Query>, BusError>> + Send {
+        (**self).serve(expression)
+    }
+
+    fn request(
+        &self,
+        key: &str,
+        payload: Vec<u8>,
+        timeout: Duration,
+    ) -> impl Future<Output = Result<Vec<u8>, BusError>> + Send {
+        (**self).request(key, payload, timeout)
+    }
+
+    fn announce(&self, key: &str) -> impl Future<Output = Result<Self::Token, BusError>> + Send {
+        (**self).announce(key)
+    }
+
+    fn watch(
+        &self,
+        expression: &str,
+    ) -> impl Future<Output = Result<mpsc::Receiver<Liveliness>, BusError>> + Send {
+        (**self).watch(expression)
+    }
+
+    fn dropped(&self) -> u64 {
+        (**self).dropped()
+    }
+
+    fn close(&self) -> impl Future<Output = ()> + Send {
+        (**self).close()
+    }
+}

@@ -4,11 +4,18 @@
 //! [`pleiad_recording::Recording`] with truth, landmarks, nominal and commands, much faster than real
 //! time. What is random is drawn from one generator per robot and channel, so that adding a robot or a
 //! sensor leaves the noise of all others as it was.
+//!
+//! [`Fleet`] runs real nodes on such samples, or on recorded ones, in one process under virtual time;
+//! [`feed()`] hands them to running agents through their sensor keys.
 
 pub mod error;
+pub mod feed;
+pub mod fleet;
 pub mod scenario;
 pub mod world;
 
 pub use error::Error;
+pub use feed::{FeedOptions, FeedReport, feed};
+pub use fleet::{Fleet, FleetOptions, MemberOutcome};
 pub use scenario::Scenario;
 pub use world::{Prior, SimulatedRun, connectivity, simulate};
