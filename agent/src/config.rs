@@ -218,10 +218,12 @@ pub enum YawName {
     Gyro,
 }
 
-/// `[sensors.*]`: one standard deviation per component.
+/// `[sensors]`: one standard deviation per component, and what is known to be off.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorsSection {
+    /// Known bias of every range reading, subtracted, m.
+    pub range_bias_m: f64,
     /// Full relative pose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relative_pose: Option<PoseNoise>,
@@ -602,6 +604,7 @@ impl SensorsSection {
     }
 
     fn check(&self) -> Result<(), ConfigError> {
+        finite("sensors.range_bias_m", self.range_bias_m)?;
         for (index, noise) in self.profiles().iter().enumerate() {
             let Some(noise) = noise else { continue };
             for variance in
