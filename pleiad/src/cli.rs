@@ -236,7 +236,8 @@ impl FromStr for AbsoluteArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('@').and_then(|(robot, rest)| rest.split_once(':').map(|(hz, m)| (robot, hz, m)));
+        let parts =
+            text.split_once('@').and_then(|(robot, rest)| rest.split_once(':').map(|(hz, m)| (robot, hz, m)));
         let parsed = parts.and_then(|(robot, hz, sigma)| {
             Some(Self {
                 robot: RobotId(robot.parse().ok()?),

@@ -12,7 +12,9 @@ use pleiad_estimation::statistics::{NisSummary, PosePair, heading_rmse_rad};
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_recording::Recording;
-use pleiad_report::{Accuracy, FactCount, Landmark, NisPoint, NisSeries, RobotScore, RobotSeries, TeamSeries};
+use pleiad_report::{
+    Accuracy, FactCount, Landmark, NisPoint, NisSeries, RobotScore, RobotSeries, TeamSeries,
+};
 use serde::Serialize;
 
 use crate::setup::TRUTH_GAP_S;
@@ -45,7 +47,11 @@ impl RunResult {
 }
 
 /// Estimates with the truth at their times.
-pub fn pairs(estimates: impl Iterator<Item = (Timestamp, Pose2)>, robot: RobotId, recording: &Recording) -> Vec<PosePair> {
+pub fn pairs(
+    estimates: impl Iterator<Item = (Timestamp, Pose2)>,
+    robot: RobotId,
+    recording: &Recording,
+) -> Vec<PosePair> {
     estimates
         .filter_map(|(time, estimate)| {
             let truth = recording.truth_at(robot, time, TRUTH_GAP_S)?;
@@ -173,7 +179,9 @@ pub fn by_kind(ledger: &Ledger, start: Timestamp) -> (Vec<NisSeries>, Vec<FactCo
     let mut series: BTreeMap<String, NisSeries> = BTreeMap::new();
     let mut counts: BTreeMap<String, FactCount> = BTreeMap::new();
     for (key, record) in ledger.facts() {
-        let (Fact::Observation { quantity, .. }, Some(residual)) = (&record.fact, record.residual) else { continue };
+        let (Fact::Observation { quantity, .. }, Some(residual)) = (&record.fact, record.residual) else {
+            continue;
+        };
         if residual.outcome == Outcome::Placed {
             continue;
         }

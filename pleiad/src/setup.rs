@@ -83,7 +83,12 @@ impl FilterArgs {
     }
 }
 
-fn configuration(robot: RobotId, noise: &NoiseFile, filter: FilterArgs, landmarks: &[LandmarkRow]) -> AgentConfig {
+fn configuration(
+    robot: RobotId,
+    noise: &NoiseFile,
+    filter: FilterArgs,
+    landmarks: &[LandmarkRow],
+) -> AgentConfig {
     AgentConfig {
         team: "pleiad".to_owned(),
         robot: robot.0,
@@ -156,7 +161,9 @@ pub fn noise_of(settings: &RobotSettings) -> NoiseFile {
                 sensors.relative_position = Some(LengthNoise { sigma_m: relative.sigma_position_m });
             }
             RelativeKind::Range => sensors.range = Some(LengthNoise { sigma_m: relative.sigma_range_m }),
-            RelativeKind::Bearing => sensors.bearing = Some(AngleNoise { sigma_rad: relative.sigma_bearing_rad }),
+            RelativeKind::Bearing => {
+                sensors.bearing = Some(AngleNoise { sigma_rad: relative.sigma_bearing_rad })
+            }
             RelativeKind::RangeBearing => {
                 sensors.range_bearing = Some(RangeBearingNoise {
                     sigma_range_m: relative.sigma_range_m,
@@ -233,7 +240,9 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
             fed.retain(|sample| sample.time >= time);
             if fed.len() < before {
                 let count = before - fed.len();
-                notes.push(format!("robot {robot}: {count} samples before the first with ground truth left out"));
+                notes.push(format!(
+                    "robot {robot}: {count} samples before the first with ground truth left out"
+                ));
             }
             agent.prior = Some(prior);
         } else {
@@ -304,7 +313,8 @@ fn noise_for(robot: RobotId, recording: &Recording, options: &ReplayOptions) -> 
         None => None,
     };
     if let Some(path) = path {
-        let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let text =
+            std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
         return toml::from_str(&text).with_context(|| format!("{}", path.display()));
     }
     if options.mrclam {
@@ -342,7 +352,8 @@ fn noise_for(robot: RobotId, recording: &Recording, options: &ReplayOptions) -> 
             ),
             range_bias_m: nominal.robots.get(&robot).map_or(0.0, |own| own.range_bias_m),
             gps: positive(noise.gps_sigma_m),
-            heading: (noise.heading_sigma_rad > 0.0).then_some(AngleNoise { sigma_rad: noise.heading_sigma_rad }),
+            heading: (noise.heading_sigma_rad > 0.0)
+                .then_some(AngleNoise { sigma_rad: noise.heading_sigma_rad }),
             ..SensorsSection::default()
         },
     })

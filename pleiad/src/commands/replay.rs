@@ -86,11 +86,8 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     };
     let team = setup::recorded(&recording, &options)?;
     let out = folder::create(args.out.as_deref(), &format!("replay-{}", recording.name))?;
-    let result = if args.processes {
-        anyhow::bail!("later")
-    } else {
-        runner::in_process(&team, "replaying")?
-    };
+    let result =
+        if args.processes { anyhow::bail!("later") } else { runner::in_process(&team, "replaying")? };
     let command = command_line();
     let json = write_run(&team, &result, &out, &command, Some(ingest))?;
     output::print(args.json, &json, &text(&json))
@@ -121,9 +118,15 @@ pub fn write_run(
     write_summary(&out.join("summary.json"), &json)?;
     let (nis, facts) = evaluation::by_kind(&result.ledger, first);
     let mut highlights = vec![
-        ("payload of a relative observation".to_owned(), format!("{:.0} bytes", json.payload_bytes.per_relative_observation)),
+        (
+            "payload of a relative observation".to_owned(),
+            format!("{:.0} bytes", json.payload_bytes.per_relative_observation),
+        ),
         ("all published bytes".to_owned(), json.payload_bytes.total.to_string()),
-        ("wall-clock time".to_owned(), format!("{:.2} s for {:.0} s", json.seconds.wall, json.seconds.recorded)),
+        (
+            "wall-clock time".to_owned(),
+            format!("{:.2} s for {:.0} s", json.seconds.wall, json.seconds.recorded),
+        ),
     ];
     if result.processes > 0 {
         highlights.push(("agent processes".to_owned(), result.processes.to_string()));
@@ -169,7 +172,9 @@ fn summary(
         out: out.display().to_string(),
         robots: robots.collect(),
         mean_position_rmse_m: evaluation::mean_position_rmse_m(scores.iter(), |score| score.settled),
-        dead_reckoning_mean_rmse_m: evaluation::mean_position_rmse_m(scores.iter(), |score| score.dead_reckoning),
+        dead_reckoning_mean_rmse_m: evaluation::mean_position_rmse_m(scores.iter(), |score| {
+            score.dead_reckoning
+        }),
         online_mean_position_rmse_m: evaluation::mean_position_rmse_m(scores.iter(), |score| score.online),
         facts: FactsJson {
             relative: counts.relative,
@@ -208,7 +213,8 @@ fn write_trajectories(result: &RunResult, out: &Path) -> anyhow::Result<()> {
 /// The summary for people.
 pub fn text(json: &ReplayJson) -> String {
     let metres = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
-    let mut text = format!("{}: {:.1} s in {:.1} s\n\n", json.recording, json.seconds.recorded, json.seconds.wall);
+    let mut text =
+        format!("{}: {:.1} s in {:.1} s\n\n", json.recording, json.seconds.recorded, json.seconds.wall);
     let _ = writeln!(text, "robot  position RMSE m  heading RMSE rad  dead reckoning m  distance m");
     for robot in &json.robots {
         let _ = writeln!(

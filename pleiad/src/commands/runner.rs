@@ -28,7 +28,10 @@ pub fn in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
     bar.finish_and_clear();
     let mut notes = team.notes.clone();
     if !agreed {
-        notes.push("the robots did not agree at the end: some observations stayed without their other half".to_owned());
+        notes.push(
+            "the robots did not agree at the end: some observations stayed without their other half"
+                .to_owned(),
+        );
     }
     let mut robots = std::collections::BTreeMap::new();
     let mut ledger = None;
