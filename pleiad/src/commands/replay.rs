@@ -10,7 +10,7 @@ use pleiad_recording::{IngestReport, ReadOptions, Recording, tum};
 use pleiad_report::{ReplayReport, RobotScore, replay_report, write_summary};
 use serde::Serialize;
 
-use super::runner;
+use super::runner::{self, Feeder, ProcessOptions};
 use crate::cli::ReplayArgs;
 use crate::evaluation::{self, NisJson, RunResult};
 use crate::setup::{self, FilterArgs, ReplayOptions, Team};
