@@ -40,11 +40,3 @@ pub fn progress(label: &str, seconds: f64) -> ProgressBar {
     bar.set_message(label.to_owned());
     bar
 }
-
-/// A step without a known length.
-pub fn spinner(label: &str) -> ProgressBar {
-    let bar = ProgressBar::new_spinner();
-    bar.set_message(label.to_owned());
-    bar.enable_steady_tick(std::time::Duration::from_millis(120));
-    bar
-}

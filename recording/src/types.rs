@@ -111,6 +111,7 @@ pub struct NominalRangeSensor {
 pub struct NominalRobot {
     pub wheel_radius: f64,
     pub track_width: f64,
+    /// 0 where the encoder is believed to be exact.
     pub encoder_ticks_per_rev: f64,
     pub servo_time_constant_s: f64,
     pub servo_time_constant_turn_s: f64,

@@ -86,8 +86,12 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     };
     let team = setup::recorded(&recording, &options)?;
     let out = folder::create(args.out.as_deref(), &format!("replay-{}", recording.name))?;
-    let result =
-        if args.processes { anyhow::bail!("later") } else { runner::in_process(&team, "replaying")? };
+    let result = if args.processes {
+        let options = ProcessOptions { feeder: Feeder::Samples, speed: None, restart: false, label: "replaying" };
+        runner::as_processes(&team, &out, &options)?
+    } else {
+        runner::in_process(&team, "replaying")?
+    };
     let command = command_line();
     let json = write_run(&team, &result, &out, &command, Some(ingest))?;
     output::print(args.json, &json, &text(&json))

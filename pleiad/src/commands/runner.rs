@@ -185,7 +185,7 @@ async fn conduct(
     let agents = Agents::launch(config, bus.clone()).await?;
     agents.wait_until_alive(ALIVE_WITHIN).await?;
     feed(config, input, options, connect, span).await?;
-    let settled = agents.wait_until_settled(SETTLED_WITHIN, &std::collections::BTreeSet::new()).await;
+    let settled = agents.wait_until_settled(&std::collections::BTreeSet::new(), SETTLED_WITHIN).await;
     let ended = agents.shutdown(ENDED_WITHIN).await;
     settled?;
     ended?;
