@@ -167,7 +167,7 @@ fn describe(
         unobservable: observability.unobservable.clone(),
         team_sigma_early_m: early,
         team_sigma_late_m: late,
-        final_position_sigma_m: root_mean_square(&finals),
+        final_position_sigma_m: finals.iter().copied().fold(f64::NAN, f64::max),
         position_rmse_m: root_mean_square(&rmse),
         processes: result.processes,
         facts: facts as u64,
