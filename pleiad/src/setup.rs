@@ -162,7 +162,7 @@ pub fn noise_of(settings: &RobotSettings) -> NoiseFile {
             }
             RelativeKind::Range => sensors.range = Some(LengthNoise { sigma_m: relative.sigma_range_m }),
             RelativeKind::Bearing => {
-                sensors.bearing = Some(AngleNoise { sigma_rad: relative.sigma_bearing_rad })
+                sensors.bearing = Some(AngleNoise { sigma_rad: relative.sigma_bearing_rad });
             }
             RelativeKind::RangeBearing => {
                 sensors.range_bearing = Some(RangeBearingNoise {

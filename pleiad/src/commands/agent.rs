@@ -1,6 +1,5 @@
 //! `pleiad agent`: one robot's agent, until told to shut down.
 
-use std::future::Future;
 use std::sync::Arc;
 
 use anyhow::Context;
@@ -45,21 +44,19 @@ fn zenoh_config(config: &AgentConfig) -> ZenohConfig {
 }
 
 /// Ends at Ctrl-C or SIGTERM.
-pub fn stopped() -> impl Future<Output = ()> + Send {
-    async {
-        let interrupt = tokio::signal::ctrl_c();
-        let mut terminate = match tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate()) {
-            Ok(terminate) => terminate,
-            Err(error) => {
-                tracing::warn!(%error, "SIGTERM cannot be caught: results will not be written on it");
-                // A signal that cannot be awaited leaves the other one.
-                let _ = interrupt.await;
-                return;
-            }
-        };
-        tokio::select! {
-            _ = interrupt => {}
-            _ = terminate.recv() => {}
+pub async fn stopped() {
+    let interrupt = tokio::signal::ctrl_c();
+    let mut terminate = match tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate()) {
+        Ok(terminate) => terminate,
+        Err(error) => {
+            tracing::warn!(%error, "SIGTERM cannot be caught: results will not be written on it");
+            // A signal that cannot be awaited leaves the other one.
+            let _ = interrupt.await;
+            return;
         }
+    };
+    tokio::select! {
+        _ = interrupt => {}
+        _ = terminate.recv() => {}
     }
 }

@@ -64,7 +64,10 @@ struct CaseJson {
 
 pub fn run(args: &DemoArgs) -> anyhow::Result<()> {
     if !(args.seconds.is_finite() && args.seconds >= SHORTEST_S) {
-        bail!("--seconds {}: expected at least {SHORTEST_S}, so that early and late can be told apart", args.seconds);
+        bail!(
+            "--seconds {}: expected at least {SHORTEST_S}, so that early and late can be told apart",
+            args.seconds
+        );
     }
     if let Some(speed) = args.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
         bail!("--speed {speed}: expected a positive number");
@@ -126,7 +129,8 @@ fn run_case(args: &DemoArgs, name: &str, text: &str, out: &Path) -> anyhow::Resu
 fn cut_off(team: &Team) -> Vec<String> {
     let stretches = connectivity(&team.recording, CUT_OFF_S);
     let lost = stretches.iter().filter(|stretch| !stretch.cut_off_from(GPS_ROBOT).is_empty());
-    lost.map(|stretch| format!("no chain of sightings to robot {GPS_ROBOT} within {CUT_OFF_S} s: {stretch}")).collect()
+    lost.map(|stretch| format!("no chain of sightings to robot {GPS_ROBOT} within {CUT_OFF_S} s: {stretch}"))
+        .collect()
 }
 
 fn describe(
@@ -137,7 +141,8 @@ fn describe(
 ) -> anyhow::Result<(CaseJson, DemoCase)> {
     let (start, _) = team.span().context("there is not a single sample")?;
     let sigma = |from, to| {
-        evaluation::team_sigma_m(&result, start, from, to).context("no estimate in the window of the team's sigma")
+        evaluation::team_sigma_m(&result, start, from, to)
+            .context("no estimate in the window of the team's sigma")
     };
     let early = sigma(EARLY_S.0, EARLY_S.1)?;
     let late = sigma(args.seconds - LATE_S, args.seconds)?;
@@ -199,7 +204,10 @@ fn text(json: &DemoJson) -> String {
         "{} robots, {} s, seed {}: the same team without and with one GPS receiver\n\n",
         json.robots, json.seconds, json.seed
     );
-    let _ = writeln!(text, "case            rank     team sigma 60-90 s   last 30 s   ratio   mean RMSE   facts  agents");
+    let _ = writeln!(
+        text,
+        "case            rank     team sigma 60-90 s   last 30 s   ratio   mean RMSE   facts  agents"
+    );
     for case in &json.cases {
         let _ = writeln!(
             text,

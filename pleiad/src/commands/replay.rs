@@ -87,7 +87,8 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let team = setup::recorded(&recording, &options)?;
     let out = folder::create(args.out.as_deref(), &format!("replay-{}", recording.name))?;
     let result = if args.processes {
-        let options = ProcessOptions { feeder: Feeder::Samples, speed: None, restart: false, label: "replaying" };
+        let options =
+            ProcessOptions { feeder: Feeder::Samples, speed: None, restart: false, label: "replaying" };
         runner::as_processes(&team, &out, &options)?
     } else {
         runner::in_process(&team, "replaying")?

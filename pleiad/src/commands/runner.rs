@@ -28,8 +28,8 @@ use crate::{folder, output};
 /// Digest rounds granted after the last sample; without faults one is enough.
 const SETTLING_ROUNDS: u32 = 50;
 /// Limits for a machine that is very busy; a run that goes well never comes near them.
-const ALIVE_WITHIN: Duration = Duration::from_secs(60);
-const SETTLED_WITHIN: Duration = Duration::from_secs(60);
+const ALIVE_WITHIN: Duration = Duration::from_mins(1);
+const SETTLED_WITHIN: Duration = Duration::from_mins(1);
 const ENDED_WITHIN: Duration = Duration::from_secs(30);
 
 /// Runs all nodes in this process.
@@ -48,7 +48,8 @@ pub fn in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
     let mut notes = team.notes.clone();
     if !agreed {
         notes.push(
-            "the robots did not agree at the end: some observations stayed without their other half".to_owned(),
+            "the robots did not agree at the end: some observations stayed without their other half"
+                .to_owned(),
         );
     }
     let mut robots = BTreeMap::new();
@@ -214,7 +215,11 @@ async fn feed(
         let mut lines = BufReader::new(stdout).lines();
         while let Some(line) = lines.next_line().await? {
             if let Ok(second) = line.parse::<f64>() {
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds of a run")]
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "seconds of a run"
+                )]
                 bar.set_position((second - first.seconds()).max(0.0) as u64);
             }
         }
@@ -253,7 +258,10 @@ fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult>
         // An independent fold of what the agent wrote down must give the bits it announced.
         let folded = own.fingerprint().to_string();
         if folded != summary.estimate {
-            bail!("robot {robot}: the agent ended with estimate {}, its journal folds to {folded}", summary.estimate);
+            bail!(
+                "robot {robot}: the agent ended with estimate {}, its journal folds to {folded}",
+                summary.estimate
+            );
         }
         for (reason, count) in &summary.samples_refused {
             notes.push(format!("robot {robot}: {count} samples refused ({reason})"));

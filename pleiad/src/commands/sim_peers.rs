@@ -64,7 +64,10 @@ pub fn run(args: &SimPeersArgs) -> anyhow::Result<()> {
     }
     let accepted: u64 = reports.values().map(|report| report.accepted).sum();
     if accepted == 0 {
-        bail!("no agent of team {} took a single sample: are they running at the endpoints given?", args.team);
+        bail!(
+            "no agent of team {} took a single sample: are they running at the endpoints given?",
+            args.team
+        );
     }
     Ok(())
 }
