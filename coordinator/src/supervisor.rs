@@ -38,6 +38,8 @@ pub(crate) struct Supervisor {
     processes: JoinSet<(RobotId, Exit, Duration)>,
     /// Where signals for the running processes go.
     orders: BTreeMap<RobotId, mpsc::Sender<Order>>,
+    /// Agents that are meant to end: their going is no cause for alarm.
+    held: BTreeSet<RobotId>,
     /// Waits before restarts.
     waits: JoinSet<Input>,
     members: watch::Sender<Members>,
@@ -60,6 +62,7 @@ impl Supervisor {
             membership,
             processes: JoinSet::new(),
             orders: BTreeMap::new(),
+            held: BTreeSet::new(),
             waits: JoinSet::new(),
             members,
             events,
@@ -109,11 +112,13 @@ impl Supervisor {
         match request {
             Request::Hold { robots, done } => {
                 for robot in robots {
+                    self.held.insert(robot);
                     self.handle(Input::Hold { robot });
                 }
                 let _ = done.send(());
             }
             Request::Start { robot, done } => {
+                self.held.remove(&robot);
                 self.handle(Input::Start { robot });
                 let _ = done.send(());
             }
@@ -133,7 +138,7 @@ impl Supervisor {
             for action in self.membership.handle(input) {
                 match action {
                     Action::Tell(event) => {
-                        log(event);
+                        self.log(event);
                         // Nobody need be listening.
                         let _ = self.events.send(event);
                     }
@@ -185,23 +190,28 @@ impl Supervisor {
             (robot, exit, ran)
         });
     }
-}
 
-fn log(event: TeamEvent) {
-    match event {
-        TeamEvent::AgentUp { robot } => tracing::info!(robot = robot.0, "agent is up"),
-        TeamEvent::AgentDown { robot } => tracing::warn!(robot = robot.0, "agent is down or out of reach"),
-        TeamEvent::Exited { robot, exit } if exit.failed() => {
-            tracing::warn!(robot = robot.0, %exit, "the agent's process ended");
-        }
-        TeamEvent::Exited { robot, exit } => {
-            tracing::info!(robot = robot.0, %exit, "the agent's process ended");
-        }
-        TeamEvent::Restarted { robot, restarts } => {
-            tracing::info!(robot = robot.0, restarts, "agent restarted");
-        }
-        TeamEvent::GaveUp { robot, attempts } => {
-            tracing::error!(robot = robot.0, attempts, "the agent failed too often and stays ended");
+    fn log(&self, event: TeamEvent) {
+        match event {
+            TeamEvent::AgentUp { robot } => tracing::info!(robot = robot.0, "agent is up"),
+            TeamEvent::AgentDown { robot } if self.held.contains(&robot) => {
+                tracing::info!(robot = robot.0, "agent has left");
+            }
+            TeamEvent::AgentDown { robot } => {
+                tracing::warn!(robot = robot.0, "agent is down or out of reach")
+            }
+            TeamEvent::Exited { robot, exit } if exit.failed() => {
+                tracing::warn!(robot = robot.0, %exit, "the agent's process ended");
+            }
+            TeamEvent::Exited { robot, exit } => {
+                tracing::info!(robot = robot.0, %exit, "the agent's process ended");
+            }
+            TeamEvent::Restarted { robot, restarts } => {
+                tracing::info!(robot = robot.0, restarts, "agent restarted");
+            }
+            TeamEvent::GaveUp { robot, attempts } => {
+                tracing::error!(robot = robot.0, attempts, "the agent failed too often and stays ended");
+            }
         }
     }
 }
