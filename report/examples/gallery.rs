@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use pleiad_report::{
-    DemoCase, DemoReport, FactCount, Landmark, NisPoint, NisSeries, ReplayReport, RobotScore, RobotSeries, TeamSeries,
-    demo_report, replay_report,
+    DemoCase, DemoReport, FactCount, Landmark, NisPoint, NisSeries, ReplayReport, RobotScore, RobotSeries,
+    TeamSeries, demo_report, replay_report,
 };
 
 const STEP_S: f64 = 0.1;
@@ -30,21 +30,26 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn demo() -> DemoReport {
-    let case = |name: &str, drifts: bool, unobservable: &[&str]| DemoCase {
-        name: name.into(),
-        series: team(5, 120.0, drifts),
-        rank: if drifts { 12 } else { 15 },
-        dimension: 15,
-        unobservable: unobservable.iter().map(|&direction| direction.to_owned()).collect(),
-        team_sigma_early_m: if drifts { 0.27 } else { 0.087 },
-        team_sigma_late_m: if drifts { 0.86 } else { 0.088 },
-        final_position_sigma_m: if drifts { 0.93 } else { 0.093 },
-        position_rmse_m: if drifts { 0.42 } else { 0.071 },
-        processes: 6,
-        facts: 1_482,
-        messages: 18_204,
-        bytes: 2_713_400,
-        notes: Vec::new(),
+    let case = |name: &str, drifts: bool, unobservable: &[&str]| {
+        let series = team(5, 120.0, drifts);
+        let sigma = |from_s, to_s| series.position_sigma_m(from_s, to_s).unwrap_or(f64::NAN);
+        let last = series.robots.iter().filter_map(|robot| robot.position_sigma_m().last().copied());
+        DemoCase {
+            name: name.into(),
+            rank: if drifts { 12 } else { 15 },
+            dimension: 15,
+            unobservable: unobservable.iter().map(|&direction| direction.to_owned()).collect(),
+            team_sigma_early_m: sigma(10.0, 20.0),
+            team_sigma_late_m: sigma(110.0, 120.0),
+            final_position_sigma_m: last.fold(0.0, f64::max),
+            position_rmse_m: series.position_rmse_m().unwrap_or(f64::NAN),
+            series,
+            processes: 6,
+            facts: 1_482,
+            messages: 18_204,
+            bytes: 2_713_400,
+            notes: Vec::new(),
+        }
     };
     DemoReport {
         seconds: 120.0,
@@ -54,7 +59,11 @@ fn demo() -> DemoReport {
             case(
                 "relative only",
                 true,
-                &["x of the whole team", "y of the whole team", "heading of the whole team about the map's origin"],
+                &[
+                    "x of the whole team",
+                    "y of the whole team",
+                    "heading of the whole team about the map's origin",
+                ],
             ),
             case("one robot has GPS", false, &[]),
         ],
@@ -94,9 +103,17 @@ fn replay() -> ReplayReport {
         series,
         landmarks: landmarks.collect(),
         scores,
-        nis: vec![nis("Range and bearing to landmarks", 8_000, 3), nis("Range and bearing to robots", 1_100, 4)],
+        nis: vec![
+            nis("Range and bearing to landmarks", 8_000, 3),
+            nis("Range and bearing to robots", 1_100, 4),
+        ],
         facts: vec![
-            FactCount { kind: "range and bearing to a landmark".into(), used: 7_912, rejected: 88, pending: 0 },
+            FactCount {
+                kind: "range and bearing to a landmark".into(),
+                used: 7_912,
+                rejected: 88,
+                pending: 0,
+            },
             FactCount { kind: "range and bearing to a robot".into(), used: 1_081, rejected: 17, pending: 2 },
         ],
         highlights: vec![("Processes".into(), "6".into())],
@@ -117,7 +134,11 @@ fn nis(name: &str, count: u32, seed: u64) -> NisSeries {
 
 /// Robots on loops; errors drift as one if `drifts`, else stay bounded. The covariance is that of the errors.
 fn team(robots: u32, seconds: f64, drifts: bool) -> TeamSeries {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number of steps")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a small positive number of steps"
+    )]
     let steps = (seconds / STEP_S) as u32;
     let time_s: Vec<f64> = (0..=steps).map(|step| f64::from(step) * STEP_S).collect();
     let mut noise = Noise(42);
@@ -153,8 +174,16 @@ fn one(robot: u32, time_s: &[f64], common: &[[f64; 3]], drifts: f64) -> RobotSer
         let decay = (-STEP_S / 4.0).exp();
         own = own.map(|value: f64| decay * value + (1.0 - decay * decay).sqrt() * noise.gaussian());
         let [x, y, yaw] = *shared;
-        let error = [x - yaw * truth.y_m() + OWN_M * own[0], y + yaw * truth.x_m() + OWN_M * own[1], yaw + OWN_RAD * own[2]];
-        series.estimate.push(Pose2::new(truth.x_m() + error[0], truth.y_m() + error[1], truth.yaw_rad() + error[2]));
+        let error = [
+            x - yaw * truth.y_m() + OWN_M * own[0],
+            y + yaw * truth.x_m() + OWN_M * own[1],
+            yaw + OWN_RAD * own[2],
+        ];
+        series.estimate.push(Pose2::new(
+            truth.x_m() + error[0],
+            truth.y_m() + error[1],
+            truth.yaw_rad() + error[2],
+        ));
         let turned = drifts * DRIFT_RAD.powi(2) * time;
         let shifted = drifts * DRIFT_M.powi(2) * time + OWN_M.powi(2);
         let (px, py) = (truth.x_m(), truth.y_m());
@@ -178,7 +207,11 @@ fn truth(robot: u32, time: f64) -> Pose2 {
     let phase = TAU * (time / (70.0 + 9.0 * number) + number / 5.0);
     let (radius_x, radius_y) = (2.0 + 0.55 * number, 1.6 + 0.35 * number);
     let (dx, dy) = (-radius_x * phase.sin(), 0.8 * radius_y * (2.0 * phase + number).cos());
-    Pose2::new(radius_x * phase.cos(), 0.4 * radius_y * (2.0 * phase + number).sin() + radius_y * 0.6 * phase.sin(), dy.atan2(dx))
+    Pose2::new(
+        radius_x * phase.cos(),
+        0.4 * radius_y * (2.0 * phase + number).sin() + radius_y * 0.6 * phase.sin(),
+        dy.atan2(dx),
+    )
 }
 
 /// A small repeatable generator (splitmix64).

@@ -33,8 +33,7 @@ mod tests {
     #[test]
     fn rmse_of_a_known_triangle() {
         // Distances 5 and 0: sqrt(25/2); headings 0.1 and -0.1.
-        let accuracy =
-            Accuracy::of_errors(&[[3.0, 4.0, 0.1], [f64::NAN; 3], [0.0, 0.0, -0.1]]).unwrap();
+        let accuracy = Accuracy::of_errors(&[[3.0, 4.0, 0.1], [f64::NAN; 3], [0.0, 0.0, -0.1]]).unwrap();
         assert!((accuracy.position_rmse_m - 12.5_f64.sqrt()).abs() < 1e-12);
         assert!((accuracy.heading_rmse_rad - 0.1).abs() < 1e-12);
         assert!(Accuracy::of_errors(&[[f64::NAN; 3]]).is_none());

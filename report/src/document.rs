@@ -6,7 +6,8 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::html::{escape, json_for_script, prose};
-use crate::{Figure, ReportError, Table};
+use crate::trace::Thinning;
+use crate::{Figure, MAX_POINTS, ReportError, Table};
 
 const STYLE: &str = include_str!("../assets/report.css");
 const SCRIPT: &str = include_str!("../assets/report.js");
@@ -138,7 +139,7 @@ impl Document {
              <meta name=\"color-scheme\" content=\"light dark\">\n\
              <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
              <header><h1>{title}</h1>\
-             <button type=\"button\" id=\"theme\" aria-label=\"Colour theme\" hidden></button></header>\n\
+             <button type=\"button\" id=\"theme\" title=\"Colour theme\" aria-label=\"Colour theme\" hidden></button></header>\n\
              <noscript><p class=\"verdict fails\">The figures need JavaScript, which is switched off; \
              text and tables are complete.</p></noscript>\n\
              <main>\n{body}</main>\n{foot}{plotly}<script>\n{SCRIPT}</script>\n</body>\n</html>\n"
@@ -162,7 +163,9 @@ impl Document {
         let commands: String = self
             .commands
             .iter()
-            .map(|(what, command)| format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command)))
+            .map(|(what, command)| {
+                format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command))
+            })
             .collect();
         let heading = if commands.is_empty() { "" } else { "<h2>Reproduce</h2>\n" };
         format!(
@@ -188,7 +191,9 @@ impl Block {
             Self::Facts(facts) => {
                 let items: String = facts
                     .iter()
-                    .map(|(key, value)| format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value)))
+                    .map(|(key, value)| {
+                        format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value))
+                    })
                     .collect();
                 format!("<dl>\n{items}</dl>\n")
             }
@@ -212,25 +217,33 @@ impl Block {
 
 fn render_figure(panels: &[Panel], caption: &str, numbers: &mut Numbers) -> String {
     let number = numbers.figures;
-    let mut html = format!("<figure id=\"figure-{number}\">\n<div class=\"panels panels-{}\">\n", panels.len().min(3));
+    let mut html =
+        format!("<figure id=\"figure-{number}\">\n<div class=\"panels panels-{}\">\n", panels.len().min(3));
     for panel in panels {
         numbers.plots += 1;
         let plot = numbers.plots;
-        let heading =
-            if panel.heading.is_empty() { String::new() } else { format!("<h3>{}</h3>", escape(&panel.heading)) };
+        let (class, heading) = if panel.heading.is_empty() {
+            ("panel", String::new())
+        } else {
+            ("panel headed", format!("<h3>{}</h3>", escape(&panel.heading)))
+        };
         html += &format!(
-            "<div class=\"panel\">{heading}<div class=\"plot\" id=\"plot-{plot}\" role=\"img\" aria-label=\"{}\"></div>\
+            "<div class=\"{class}\">{heading}<div class=\"plot\" id=\"plot-{plot}\" role=\"img\" aria-label=\"{}\"></div>\
              <script type=\"application/json\">{}</script></div>\n",
             escape(caption),
             json_for_script(&panel.figure.to_json())
         );
     }
-    let thinned = if panels.iter().any(|panel| panel.figure.is_thinned()) {
-        format!(" Long series are thinned to about {} points each; every peak is kept.", crate::MAX_POINTS)
-    } else {
-        String::new()
-    };
-    html + &format!("</div>\n<figcaption><b>Figure {number}.</b> {}{thinned}</figcaption>\n</figure>\n", prose(caption))
+    let any = |thinning| panels.iter().any(|panel| panel.figure.has(thinning));
+    let mut caption = prose(caption);
+    if any(Thinning::ToExtremes) {
+        caption +=
+            &format!(" Long series are thinned to at most {MAX_POINTS} points each; every peak is kept.");
+    }
+    if any(Thinning::EvenSample) {
+        caption += &format!(" Of very many points an even sample of {MAX_POINTS} is drawn.");
+    }
+    html + &format!("</div>\n<figcaption><b>Figure {number}.</b> {caption}</figcaption>\n</figure>\n")
 }
 
 /// Writes beside `path` and renames, so that no half-written file is ever seen under its name.

@@ -4,6 +4,7 @@ use serde_json::{Map, Value, json};
 
 use crate::Trace;
 use crate::html::label;
+use crate::trace::Thinning;
 
 /// An axis: what it shows, in which unit.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,7 +77,11 @@ impl Axis {
     }
 
     fn title(&self) -> String {
-        if self.unit.is_empty() { label(&self.quantity) } else { label(&format!("{} ({})", self.quantity, self.unit)) }
+        if self.unit.is_empty() {
+            label(&self.quantity)
+        } else {
+            label(&format!("{} ({})", self.quantity, self.unit))
+        }
     }
 
     /// A value on the axis in Plotly's coordinates.
@@ -159,14 +164,9 @@ impl Figure {
         self
     }
 
-    /// Whether a series was too long to show every point of it.
-    pub fn is_thinned(&self) -> bool {
-        self.traces.iter().any(|trace| trace.thinned)
-    }
-
-    /// Whether there is nothing to draw.
-    pub fn is_empty(&self) -> bool {
-        self.traces.is_empty()
+    /// Whether some of the figure's traces leave points out in this way.
+    pub(crate) fn has(&self, thinning: Thinning) -> bool {
+        self.traces.iter().any(|trace| trace.thinning == thinning)
     }
 
     /// `{data, layout, aspect}` for the script of the page; `aspect` is height by width of a map.
@@ -180,8 +180,10 @@ impl Figure {
         let row = trace.row.min(self.rows.len() - 1);
         json.insert("yaxis".into(), axis_name("y", row).into());
         if !json.contains_key("hoverinfo") {
-            let name = json.get("name").and_then(Value::as_str).unwrap_or_default();
-            let hover = format!("{}<br>{}<extra>{name}</extra>", self.x.hover("x"), self.rows[row].hover("y"));
+            let own = json.get("name").and_then(Value::as_str).unwrap_or_default();
+            let name = trace.hover_name.as_deref().unwrap_or(own);
+            let hover =
+                format!("{}<br>{}<extra>{name}</extra>", self.x.hover("x"), self.rows[row].hover("y"));
             json.insert("hovertemplate".into(), hover.into());
         }
         Value::Object(json)
@@ -199,7 +201,10 @@ impl Figure {
         for (row, axis) in self.rows.iter().enumerate() {
             let mut y = axis.json();
             let gap = if row == 0 { 0.0 } else { 0.06 };
-            y.insert("domain".into(), json!([1.0 - (row as f64 + 1.0) / count, 1.0 - row as f64 / count - gap]));
+            y.insert(
+                "domain".into(),
+                json!([1.0 - (row as f64 + 1.0) / count, 1.0 - row as f64 / count - gap]),
+            );
             if self.equal_aspect {
                 y.insert("scaleanchor".into(), "x".into());
                 y.insert("constrain".into(), "domain".into());
@@ -256,8 +261,9 @@ mod tests {
 
     #[test]
     fn logarithmic_ranges_and_notes_are_in_decades() {
-        let figure = Figure::new(Axis::new("time", "s"), Axis::new("sigma", "m").logarithmic().range(0.01, 100.0))
-            .note(5.0, 10.0, "here");
+        let figure =
+            Figure::new(Axis::new("time", "s"), Axis::new("sigma", "m").logarithmic().range(0.01, 100.0))
+                .note(5.0, 10.0, "here");
         let layout = figure.to_json()["layout"].clone();
         assert_eq!(layout["yaxis"]["range"], json!([-2.0, 2.0]));
         assert_eq!(layout["annotations"][0]["y"], json!(1.0));
@@ -265,7 +271,8 @@ mod tests {
 
     #[test]
     fn a_map_keeps_the_aspect_of_its_ranges() {
-        let map = Figure::new(Axis::new("x", "m").range(0.0, 10.0), Axis::new("y", "m").range(-2.0, 3.0)).equal_aspect();
+        let map = Figure::new(Axis::new("x", "m").range(0.0, 10.0), Axis::new("y", "m").range(-2.0, 3.0))
+            .equal_aspect();
         assert_eq!(map.to_json()["aspect"], json!(0.5));
         assert_eq!(map.to_json()["layout"]["yaxis"]["scaleanchor"], "x");
     }

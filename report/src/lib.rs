@@ -25,14 +25,16 @@ mod trace;
 
 pub use accuracy::Accuracy;
 pub use chi_square::{CONFIDENCE_95_TWO_DIMENSIONS, two_sided_95};
-pub use decimate::{MAX_POINTS, indices_keeping_extremes};
+pub use decimate::{MAX_POINTS, even_sample, indices_keeping_extremes};
 pub use document::{Document, Panel, Verdict};
 pub use ellipse::ellipse_points;
 pub use error::ReportError;
 pub use figure::{Axis, Figure};
 pub use number::quantity;
 pub use palette::{Colour, Dash, OKABE_ITO};
-pub use reports::{DemoCase, DemoReport, FactCount, ReplayReport, RobotScore, demo_report, replay_report, run_report};
+pub use reports::{
+    DemoCase, DemoReport, FactCount, ReplayReport, RobotScore, demo_report, replay_report, run_report,
+};
 pub use series::{Landmark, NisPoint, NisSeries, RobotSeries, TeamSeries};
 pub use summary::{summary_text, write_summary};
 pub use table::Table;

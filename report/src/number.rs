@@ -55,6 +55,16 @@ pub(crate) fn bytes(value: u64) -> String {
     }
 }
 
+/// A duration: seconds below two minutes, else minutes and seconds.
+pub(crate) fn duration(seconds: f64) -> String {
+    if !seconds.is_finite() || seconds < 120.0 {
+        return quantity(seconds, "s");
+    }
+    let whole = seconds.round();
+    let (minutes, rest) = ((whole / 60.0).floor(), whole % 60.0);
+    if rest == 0.0 { format!("{minutes} min") } else { format!("{minutes} min {rest} s") }
+}
+
 /// The values as JSON with as many digits as a picture shows: an error of at most 5e-6 of their span
 /// *and* of at most 5e-5 of each value (the second matters on logarithmic axes). What is not finite
 /// becomes `null`, which Plotly draws as a gap.
@@ -110,6 +120,9 @@ mod tests {
     fn counts_and_bytes_are_readable() {
         assert_eq!(count(7), "7");
         assert_eq!(count(1_234_567), "1,234,567");
+        assert_eq!(duration(90.0), "90.0 s");
+        assert_eq!(duration(1_500.2), "25 min");
+        assert_eq!(duration(150.0), "2 min 30 s");
         assert_eq!(bytes(512), "512 B");
         assert_eq!(bytes(1_234_567), "1.23 MB");
     }
@@ -133,7 +146,8 @@ mod tests {
             for (before, after) in column.iter().zip(compact(&column)) {
                 let error = (before - after.as_f64().unwrap()).abs();
                 // One ulp of the largest value on top, for the epoch column.
-                let allowed = (5.1e-6 * span).min(5.1e-5 * before.abs()) + 2.4e-7_f64.min(before.abs() * 1e-15);
+                let allowed =
+                    (5.1e-6 * span).min(5.1e-5 * before.abs()) + 2.4e-7_f64.min(before.abs() * 1e-15);
                 assert!(error <= allowed, "{before}: {error} > {allowed}");
             }
         }

@@ -24,8 +24,8 @@ pub fn summary_text(summary: &impl Serialize) -> Result<String, serde_json::Erro
 /// [`ReportError::Summary`] if it cannot be expressed as JSON, [`ReportError::Write`] if the file cannot
 /// be written.
 pub fn write_summary(path: &Path, summary: &impl Serialize) -> Result<(), ReportError> {
-    let text = summary_text(summary)
-        .map_err(|source| ReportError::Summary { path: path.to_owned(), source })?;
+    let text =
+        summary_text(summary).map_err(|source| ReportError::Summary { path: path.to_owned(), source })?;
     write_atomically(path, &text)
 }
 

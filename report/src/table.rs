@@ -13,10 +13,7 @@ pub struct Table {
 
 impl Table {
     /// An empty table.
-    pub fn new(
-        caption: impl Into<String>,
-        header: impl IntoIterator<Item = impl Into<String>>,
-    ) -> Self {
+    pub fn new(caption: impl Into<String>, header: impl IntoIterator<Item = impl Into<String>>) -> Self {
         let header: Vec<String> = header.into_iter().map(Into::into).collect();
         let numeric = vec![false; header.len()];
         Self { caption: caption.into(), header, numeric, rows: Vec::new() }

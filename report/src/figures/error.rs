@@ -42,19 +42,24 @@ fn panel(robot: &RobotSeries, colour: Colour, limits: [f64; 3]) -> Panel {
         let (quantity, unit) = COMPONENTS[component];
         Axis::new(quantity, unit).range(-limits[component], limits[component])
     };
-    let mut figure =
-        Figure::new(Axis::new("time", "s"), axis(0)).row(axis(1)).row(axis(2)).height(470);
+    let mut figure = Figure::new(Axis::new("time", "s"), axis(0)).row(axis(1)).row(axis(2)).height(470);
     let errors = robot.errors();
     for component in 0..3 {
         let bound = three_sigma(robot, component);
         let below: Vec<f64> = bound.iter().map(|bound| -bound).collect();
         let error: Vec<f64> = errors.iter().map(|error| error[component]).collect();
         figure = figure
-            .trace(Trace::band("three sigma", &robot.time_s, &below, &bound, Colour::Muted).unlisted().in_row(component))
-            .trace(Trace::line("error", &robot.time_s, &error, colour).width(1.25).unlisted().in_row(component));
+            .trace(
+                Trace::band("three sigma", &robot.time_s, &below, &bound, Colour::Muted)
+                    .unlisted()
+                    .in_row(component),
+            )
+            .trace(
+                Trace::line("error", &robot.time_s, &error, colour).width(1.25).unlisted().in_row(component),
+            );
     }
     let share = share_within_three_sigma(robot)
-        .map_or(String::new(), |share| format!(": {:.1} % within three sigma", 100.0 * share));
+        .map_or(String::new(), |share| format!(": {:.1} % within 3σ", 100.0 * share));
     Panel { heading: format!("Robot {}{share}", robot.robot), figure }
 }
 
@@ -65,7 +70,8 @@ fn three_sigma(robot: &RobotSeries, component: usize) -> Vec<f64> {
 /// The largest value that the panels show: every error, and nine in ten of the bounds.
 fn limit(robot: &RobotSeries, component: usize) -> f64 {
     let errors = robot.errors();
-    let largest = errors.iter().map(|error| error[component].abs()).filter(|e| e.is_finite()).fold(0.0, f64::max);
+    let largest =
+        errors.iter().map(|error| error[component].abs()).filter(|e| e.is_finite()).fold(0.0, f64::max);
     let mut bounds = three_sigma(robot, component);
     bounds.retain(|bound| bound.is_finite());
     bounds.sort_by(f64::total_cmp);

@@ -4,8 +4,8 @@ use pleiad_estimation::Pose2;
 
 use super::robot_name;
 use crate::{
-    Axis, CONFIDENCE_95_TWO_DIMENSIONS, Colour, Dash, Figure, Landmark, ReportError, RobotSeries, TeamSeries, Trace,
-    ellipse_points,
+    Axis, CONFIDENCE_95_TWO_DIMENSIONS, Colour, Dash, Figure, Landmark, ReportError, RobotSeries, TeamSeries,
+    Trace, ellipse_points,
 };
 
 /// Ellipses drawn per robot, evenly spread in time, the last at the end.
@@ -37,9 +37,10 @@ impl Extent {
         let inner = Self::of_points(points)?;
         let size = inner.longer_side().max(1e-3);
         let allowed = inner.widened(ELLIPSE_ALLOWANCE * size);
-        let outlines = robots().flat_map(ellipses).flatten().map(|point| {
-            [0, 1].map(|axis| point[axis].clamp(allowed.low[axis], allowed.high[axis]))
-        });
+        let outlines = robots()
+            .flat_map(ellipses)
+            .flatten()
+            .map(|point| [0, 1].map(|axis| point[axis].clamp(allowed.low[axis], allowed.high[axis])));
         let corners = [inner.low, inner.high];
         Some(Self::of_points(outlines.chain(corners))?.widened(MARGIN * size))
     }
@@ -123,7 +124,8 @@ fn above(robot: &RobotSeries, colour: Colour) -> Vec<Trace> {
     let name = robot_name(robot.robot);
     let (x, y) = columns(robot.estimate.iter().map(|pose| Some(*pose)));
     let mut traces = vec![Trace::path(&name, &x, &y, colour).group(&name)];
-    let ends = [(x.first().zip(y.first()), "start", "circle-open"), (x.last().zip(y.last()), "end", "circle")];
+    let ends =
+        [(x.first().zip(y.first()), "start", "circle-open"), (x.last().zip(y.last()), "end", "circle")];
     for (point, which, symbol) in ends {
         if let Some((&x, &y)) = point {
             let mark = Trace::markers(&format!("{name}, {which}"), &[x], &[y], colour, symbol, 9.0);
@@ -169,7 +171,8 @@ mod tests {
     use super::*;
 
     fn along_x(length_m: f64, sigma_m: f64) -> TeamSeries {
-        let poses: Vec<Pose2> = (0..=10).map(|i| Pose2::new(f64::from(i) / 10.0 * length_m, 0.0, 0.0)).collect();
+        let poses: Vec<Pose2> =
+            (0..=10).map(|i| Pose2::new(f64::from(i) / 10.0 * length_m, 0.0, 0.0)).collect();
         let robot = RobotSeries {
             robot: RobotId(1),
             time_s: (0..=10).map(f64::from).collect(),

@@ -17,13 +17,22 @@ pub fn nis_figure(series: &NisSeries) -> Result<Figure, ReportError> {
     let ((used_t, used), (rejected_t, rejected)) = (column(true), column(false));
     let mut figure = Figure::new(Axis::new("time", "s"), Axis::new("NIS", "-").logarithmic()).height(320);
     if !used.is_empty() {
-        figure = figure.trace(Trace::markers("used", &used_t, &used, Colour::Series(0), "circle", 3.0).opacity(0.6));
+        figure = figure
+            .trace(Trace::markers("used", &used_t, &used, Colour::Series(0), "circle", 3.0).opacity(0.6));
     }
     if !rejected.is_empty() {
-        figure = figure.trace(Trace::markers("rejected", &rejected_t, &rejected, Colour::Series(1), "x-thin", 7.0));
+        figure = figure.trace(Trace::markers(
+            "rejected",
+            &rejected_t,
+            &rejected,
+            Colour::Series(1),
+            "x-thin",
+            7.0,
+        ));
     }
     if !series.points.is_empty() {
-        let bound = |name: &str, value: f64| Trace::line(name, &ends, &[value, value], Colour::Ink).dash(Dash::Dash);
+        let bound =
+            |name: &str, value: f64| Trace::line(name, &ends, &[value, value], Colour::Ink).dash(Dash::Dash);
         figure = figure.trace(bound("95 % bounds", high).group("bounds"));
         figure = figure.trace(bound("lower 95 % bound", low).group("bounds").unlisted());
     }

@@ -1,7 +1,7 @@
 //! The report of the observability demonstration.
 
-use crate::figures::{Extent, error_figures, map_figure, sigma_figure};
-use crate::number::{bytes, count};
+use crate::figures::{Extent, error_figures, map_figure, sigma_figure, sigma_patterns};
+use crate::number::{bytes, count, duration};
 use crate::reports::{MAP_CAPTION, SIGMA_MEANING};
 use crate::{Document, Panel, ReportError, Table, TeamSeries, Verdict, quantity};
 
@@ -79,7 +79,7 @@ impl DemoCase {
         } else {
             format!("the team's position sigma stays bounded, {early} early and {late} late")
         };
-        format!("With `{}`, rank {} of {}: {course}.", self.name, self.rank, self.dimension)
+        format!("With “{}”, rank {} of {}: {course}.", self.name, self.rank, self.dimension)
     }
 }
 
@@ -97,26 +97,31 @@ pub fn demo_report(demo: &DemoReport) -> Result<Document, ReportError> {
     let mut document = Document::new("A team of robots is one estimator: what it can and cannot know")
         .lead(format!(
             "{} robots drive for {} and localize as one distributed Kalman filter that no machine owns. \
-             Seeing only each other, they know how they stand to one another but lose where they are; \
-             an absolute observation of a single robot holds all of them.",
+             Theory says: seeing only each other, they know how they stand to one another but lose where they are; \
+             absolute observations of a single robot hold all of them.",
             demo.robots,
-            quantity(demo.seconds, "s")
+            duration(demo.seconds)
         ))
         .verdict(verdict, sentences.join(" "))
         .table(comparison(demo))
         .section("How sure the robots are");
-    let cases: Vec<(&str, &TeamSeries)> = demo.cases.iter().map(|case| (case.name.as_str(), &case.series)).collect();
+    let cases: Vec<(&str, &TeamSeries)> =
+        demo.cases.iter().map(|case| (case.name.as_str(), &case.series)).collect();
     document = document.figure(
         sigma_figure(&cases)?,
         format!(
-            "Position sigma of every robot in every case on one axis: colour tells the robot, line pattern the case; the \
-             labels give the root mean square over the robots at the end. {SIGMA_MEANING}"
+            "Position sigma of every robot in every case on one axis. Colour tells the robot, line pattern the case \
+             ({}); the labels give the root mean square over the robots at the end. {SIGMA_MEANING}",
+            sigma_patterns(&cases)
         ),
     );
     document = document.section("Where they thought they were").panels(maps(demo)?, maps_caption());
     document = errors(document, demo)?;
     document = explanation(document, demo);
-    let notes = demo.cases.iter().flat_map(|case| case.notes.iter().map(move |note| format!("{}: {note}", case.name)));
+    let notes = demo
+        .cases
+        .iter()
+        .flat_map(|case| case.notes.iter().map(move |note| format!("{}: {note}", case.name)));
     let notes: Vec<String> = notes.collect();
     if !notes.is_empty() {
         document = document.section("Remarks").list(notes);
@@ -159,7 +164,9 @@ fn maps(demo: &DemoReport) -> Result<Vec<Panel>, ReportError> {
 }
 
 fn maps_caption() -> String {
-    format!("The same drive, localized in every case, at one scale. {MAP_CAPTION} Ellipses too wide for the frame are cut.")
+    format!(
+        "The same drive, localized in every case, at one scale. {MAP_CAPTION} Ellipses too wide for the frame are cut."
+    )
 }
 
 fn errors(mut document: Document, demo: &DemoReport) -> Result<Document, ReportError> {
@@ -194,7 +201,7 @@ fn explanation(mut document: Document, demo: &DemoReport) -> Document {
             continue;
         }
         document = document
-            .prose(format!("Directions that nothing observes in the case `{}`:", case.name))
+            .prose(format!("Directions that nothing observes in the case “{}”:", case.name))
             .list(case.unobservable.clone());
     }
     document
@@ -240,7 +247,8 @@ mod tests {
 
     #[test]
     fn a_failed_prediction_is_not_called_a_success() {
-        let report = |cases| DemoReport { seconds: 60.0, seed: 1, robots: 5, cases, command: "pleiad demo".into() };
+        let report =
+            |cases| DemoReport { seconds: 60.0, seed: 1, robots: 5, cases, command: "pleiad demo".into() };
         let failed = demo_report(&report(vec![case(15, 0.2, 1.5)])).unwrap().render();
         assert!(failed.contains("Not as predicted.") && !failed.contains("<b>As predicted.</b>"));
         let held = demo_report(&report(vec![case(12, 0.2, 1.5)])).unwrap().render();

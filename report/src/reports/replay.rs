@@ -3,10 +3,10 @@
 use pleiad_estimation::RobotId;
 
 use crate::figures::{bar_figure, error_figures, map_figure, nis_figure, share_within_bounds, sigma_figure};
-use crate::number::count;
+use crate::number::{count, duration};
 use crate::reports::{MAP_CAPTION, SIGMA_MEANING};
 use crate::{
-    Accuracy, Axis, Document, Landmark, NisSeries, Panel, ReportError, Table, TeamSeries, quantity,
+    Accuracy, Axis, Colour, Document, Landmark, NisSeries, Panel, ReportError, Table, TeamSeries, quantity,
 };
 
 /// What a run or a replay showed.
@@ -83,7 +83,7 @@ fn team_report(report: &ReplayReport, title: &str) -> Result<Document, ReportErr
     let mut document = Document::new(title)
         .lead(lead(report))
         .fact("Robots", report.series.robots.len().to_string())
-        .fact("Duration", quantity(report.seconds, "s"))
+        .fact("Duration", duration(report.seconds))
         .fact("Facts used", count(report.facts.iter().map(|fact| fact.used).sum()));
     for (key, value) in &report.highlights {
         document = document.fact(key, value);
@@ -193,11 +193,11 @@ fn scores_figure(scores: &[RobotScore]) -> Result<crate::Figure, ReportError> {
     let values = |of: &dyn Fn(&RobotScore) -> Option<Accuracy>| -> Vec<f64> {
         scores.iter().map(|score| of(score).map_or(f64::NAN, |accuracy| accuracy.position_rmse_m)).collect()
     };
-    let mut groups = vec![("settled", values(&|score| score.settled))];
+    let mut groups = vec![("settled", Colour::Series(0), values(&|score| score.settled))];
     if scores.iter().any(|score| score.online.is_some()) {
-        groups.push(("online", values(&|score| score.online)));
+        groups.push(("online", Colour::Series(4), values(&|score| score.online)));
     }
-    groups.push(("odometry alone", values(&|score| score.dead_reckoning)));
+    groups.push(("odometry alone", Colour::Muted, values(&|score| score.dead_reckoning)));
     bar_figure("robot", &robots, Axis::new("position error, RMS", "m"), &groups)
 }
 
@@ -211,19 +211,20 @@ fn innovations(mut document: Document, report: &ReplayReport) -> Result<Document
                        an earlier entry.";
         let mut table = Table::new(caption, ["Kind", "Used", "Rejected", "Pending"]).numeric();
         for fact in &report.facts {
-            table = table.row([fact.kind.clone(), count(fact.used), count(fact.rejected), count(fact.pending)]);
+            table =
+                table.row([fact.kind.clone(), count(fact.used), count(fact.rejected), count(fact.pending)]);
         }
         document = document.table(table);
     }
     let mut panels = Vec::new();
     for series in report.nis.iter().filter(|series| !series.points.is_empty()) {
         let share = share_within_bounds(series)?
-            .map_or(String::new(), |share| format!(": {:.1} % of used within bounds", 100.0 * share));
+            .map_or(String::new(), |share| format!(": {:.1} % within bounds", 100.0 * share));
         panels.push(Panel { heading: format!("{}{share}", series.name), figure: nis_figure(series)? });
     }
     Ok(document.panels(
         panels,
-        "Normalized innovation squared (NIS) of every observation. Of a consistent filter 95 % lie between the dashed \
+        "Normalized innovation squared (NIS) of every observation. The share within bounds is that of the used ones. Of a consistent filter 95 % lie between the dashed \
          bounds; many above mean that it is too sure of itself, many below that it is too cautious.",
     ))
 }
