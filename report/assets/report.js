@@ -46,6 +46,7 @@
     }
     for (const note of layout.annotations) note.font = { color: ink, size: narrow ? 11 : 13 };
     const margin = { l: narrow ? 48 : 60, r: narrow ? 8 : 16, t: 8, b: 44 };
+    if (printing) layout.height *= 0.75; // two rows of small figures to a page
     if (spec.aspect) {
       const drawn = (width - margin.l - margin.r) * spec.aspect;
       const legend = spec.data.some((trace) => trace.showlegend !== false) ? 56 : 0;

@@ -126,7 +126,7 @@ fn nis(name: &str, count: u32, seed: u64) -> NisSeries {
     let mut noise = Noise(seed);
     let point = |i: u32| {
         let nis = noise.gaussian().powi(2) + noise.gaussian().powi(2);
-        let nis = if i % 97 == 0 { nis * 9.0 + 10.0 } else { nis };
+        let nis = if i.is_multiple_of(97) { nis * 9.0 + 10.0 } else { nis };
         NisPoint { time_s: f64::from(i) * 1_500.0 / f64::from(count), nis, used: nis < 13.8 }
     };
     NisSeries { name: name.into(), degrees_of_freedom: 2, points: (0..count).map(point).collect() }

@@ -160,13 +160,9 @@ impl Document {
     }
 
     fn foot(&self) -> String {
-        let commands: String = self
-            .commands
-            .iter()
-            .map(|(what, command)| {
-                format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command))
-            })
-            .collect();
+        let commands = each(&self.commands, |(what, command)| {
+            format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command))
+        });
         let heading = if commands.is_empty() { "" } else { "<h2>Reproduce</h2>\n" };
         format!(
             "<footer>\n{heading}{commands}<p class=\"fine\">Made by Pleiad. This file is complete in itself and fetches \
@@ -189,18 +185,15 @@ impl Block {
                 format!("<p class=\"verdict {class}\"><b>{word}</b> {}</p>\n", prose(text))
             }
             Self::Facts(facts) => {
-                let items: String = facts
-                    .iter()
-                    .map(|(key, value)| {
-                        format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value))
-                    })
-                    .collect();
+                let items = each(facts, |(key, value)| {
+                    format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value))
+                });
                 format!("<dl>\n{items}</dl>\n")
             }
             Self::Section(heading) => format!("<h2>{}</h2>\n", escape(heading)),
             Self::Prose(text) => format!("<p>{}</p>\n", prose(text)),
             Self::List(items) => {
-                let items: String = items.iter().map(|item| format!("<li>{}</li>\n", prose(item))).collect();
+                let items = each(items, |item| format!("<li>{}</li>\n", prose(item)));
                 format!("<ul>\n{items}</ul>\n")
             }
             Self::Table(table) => {
@@ -215,35 +208,50 @@ impl Block {
     }
 }
 
+/// The HTML of every item, joined.
+fn each<T>(items: &[T], html: impl Fn(&T) -> String) -> String {
+    items.iter().map(html).collect()
+}
+
 fn render_figure(panels: &[Panel], caption: &str, numbers: &mut Numbers) -> String {
     let number = numbers.figures;
-    let mut html =
-        format!("<figure id=\"figure-{number}\">\n<div class=\"panels panels-{}\">\n", panels.len().min(3));
+    let spoken = escape(caption);
+    let mut drawn = String::new();
     for panel in panels {
         numbers.plots += 1;
-        let plot = numbers.plots;
-        let (class, heading) = if panel.heading.is_empty() {
-            ("panel", String::new())
-        } else {
-            ("panel headed", format!("<h3>{}</h3>", escape(&panel.heading)))
-        };
-        html += &format!(
-            "<div class=\"{class}\">{heading}<div class=\"plot\" id=\"plot-{plot}\" role=\"img\" aria-label=\"{}\"></div>\
-             <script type=\"application/json\">{}</script></div>\n",
-            escape(caption),
-            json_for_script(&panel.figure.to_json())
-        );
+        drawn += &render_panel(panel, numbers.plots, &spoken);
     }
     let any = |thinning| panels.iter().any(|panel| panel.figure.has(thinning));
-    let mut caption = prose(caption);
-    if any(Thinning::ToExtremes) {
-        caption +=
-            &format!(" Long series are thinned to at most {MAX_POINTS} points each; every peak is kept.");
-    }
-    if any(Thinning::EvenSample) {
-        caption += &format!(" Of very many points an even sample of {MAX_POINTS} is drawn.");
-    }
-    html + &format!("</div>\n<figcaption><b>Figure {number}.</b> {caption}</figcaption>\n</figure>\n")
+    let thinned = if any(Thinning::ToExtremes) {
+        format!(" Long series are thinned to at most {MAX_POINTS} points each; every peak is kept.")
+    } else {
+        String::new()
+    };
+    let sampled = if any(Thinning::EvenSample) {
+        format!(" Of very many points an even sample of {MAX_POINTS} is drawn.")
+    } else {
+        String::new()
+    };
+    format!(
+        "<figure id=\"figure-{number}\">\n<div class=\"panels panels-{}\">\n{drawn}</div>\n\
+         <figcaption><b>Figure {number}.</b> {}{thinned}{sampled}</figcaption>\n</figure>\n",
+        panels.len().min(3),
+        prose(caption)
+    )
+}
+
+fn render_panel(panel: &Panel, plot: usize, spoken: &str) -> String {
+    let (class, heading) = if panel.heading.is_empty() {
+        ("panel", String::new())
+    } else {
+        ("panel headed", format!("<h3>{}</h3>", escape(&panel.heading)))
+    };
+    format!(
+        "<div class=\"{class}\">{heading}\
+         <div class=\"plot\" id=\"plot-{plot}\" role=\"img\" aria-label=\"{spoken}\"></div>\
+         <script type=\"application/json\">{}</script></div>\n",
+        json_for_script(&panel.figure.to_json())
+    )
 }
 
 /// Writes beside `path` and renames, so that no half-written file is ever seen under its name.

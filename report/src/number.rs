@@ -11,7 +11,7 @@ pub fn quantity(value: f64, unit: &str) -> String {
     let magnitude = value.abs();
     let number = if magnitude == 0.0 {
         "0".to_owned()
-    } else if magnitude < 5e-4 || magnitude >= 1e7 {
+    } else if !(5e-4..1e7).contains(&magnitude) {
         format!("{value:.2e}")
     } else if magnitude >= 99.95 {
         grouped(value.abs().round(), value < 0.0)
@@ -30,7 +30,7 @@ pub(crate) fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
     for (position, digit) in digits.chars().enumerate() {
-        if position > 0 && (digits.len() - position) % 3 == 0 {
+        if position > 0 && (digits.len() - position).is_multiple_of(3) {
             text.push(',');
         }
         text.push(digit);

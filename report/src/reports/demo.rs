@@ -178,7 +178,7 @@ fn errors(mut document: Document, demo: &DemoReport) -> Result<Document, ReportE
         document = document.panels(
             error_figures(&case.series)?,
             format!(
-                "{}: error of x, y and heading (line) within three sigma (grey) for every robot, in the map frame, at one \
+                "{}: error of x, y and yaw (line) within three sigma (grey) for every robot, in the map frame, at one \
                  scale. Bounds beyond the frame are cut.",
                 sentence_case(&case.name)
             ),

@@ -112,7 +112,7 @@ fn team_report(report: &ReplayReport, title: &str) -> Result<Document, ReportErr
     if !errors.is_empty() {
         document = document.section("Errors against the filter's own bounds").panels(
             errors,
-            "Error of x, y and heading (line) within three sigma (grey) for every robot with known truth, in the map frame, \
+            "Error of x, y and yaw (line) within three sigma (grey) for every robot with known truth, in the map frame, \
              at one scale. A consistent filter keeps 99.7 % within. Bounds beyond the frame are cut.",
         );
     }
