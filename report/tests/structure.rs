@@ -1,5 +1,7 @@
 //! What every report must have: axes with units, data in every figure, nothing fetched, nothing injected.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail as tests do")]
+
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use pleiad_report::{

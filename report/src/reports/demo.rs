@@ -193,8 +193,9 @@ fn explanation(mut document: Document, demo: &DemoReport) -> Document {
          or turned as one. Three directions of the joint state (x, y and heading of the team as a whole) therefore never \
          show in any such observation: the observability matrix of N robots has rank 3N − 3 of 3N. Along these directions \
          odometry noise adds up and nothing takes it away, so the sigmas grow without bound, although the robots know \
-         their places relative to each other well. One absolute observation of one robot makes the rank full, and the \
-         correlations that the joint filter keeps carry it to every other robot.",
+         their places relative to each other well. Absolute observations of one robot (a position now and then \
+         while it moves is enough) make the rank full, and the correlations that the joint filter keeps carry them to \
+         every other robot.",
     );
     for case in &demo.cases {
         if case.unobservable.is_empty() {
