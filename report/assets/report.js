@@ -7,6 +7,7 @@
     name: element.closest("figure").id,
   }));
   const FULL_PAGE_PX = 680; // A4 less its margins, at 96 px to the inch
+  const touch = window.matchMedia("(hover: none)").matches; // a finger on a figure scrolls the page
   let printing = false;
 
   // "@ink" and "@paper/0.8" are colours of the page's theme, "#0072B2/0.16" any colour with an opacity.
@@ -45,6 +46,7 @@
     }
     for (const note of layout.annotations) note.font = { color: ink, size: narrow ? 11 : 13 };
     const margin = { l: narrow ? 48 : 60, r: narrow ? 8 : 16, t: 8, b: 44 };
+    if (printing) layout.height *= 0.75; // two rows of small figures to a page
     if (spec.aspect) {
       const drawn = (width - margin.l - margin.r) * spec.aspect;
       const legend = spec.data.some((trace) => trace.showlegend !== false) ? 56 : 0;
@@ -54,27 +56,29 @@
       width, margin, paper_bgcolor: paper, plot_bgcolor: paper, barmode: "group",
       font: { family: getComputedStyle(document.body).fontFamily, size: narrow ? 11 : 12.5, color: ink },
       hoverlabel: { bgcolor: paper, bordercolor: line, font: { color: ink } },
-      hovermode: "closest", dragmode: "zoom", uirevision: "kept",
+      hovermode: "closest", dragmode: touch ? false : "zoom", uirevision: "kept",
       showlegend: spec.data.filter((trace) => trace.showlegend !== false).length > 1,
       legend: {
         orientation: "h", x: 0, xanchor: "left", y: 1.02, yanchor: "bottom",
-        groupclick: spec.data.some((trace) => trace.legendgrouptitle) ? "toggleitem" : "togglegroup",
-        grouptitlefont: { color: ink }, tracegroupgap: 4, itemwidth: 30,
+        groupclick: "togglegroup", tracegroupgap: 4, itemwidth: 30,
       },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("@muted"), activecolor: ink },
     });
   };
 
-  const draw = ({ element, spec, name }) => {
+  const saveButton = (format, icon, filename) => ({
+    name: `save-${format}`, title: `Save as ${format.toUpperCase()}`, icon,
+    click: (graph) => Plotly.downloadImage(graph, { format, filename, scale: 2, width: graph._fullLayout.width, height: graph._fullLayout.height }),
+  });
+
+  const draw = (plot) => {
+    const { element, spec, name } = plot;
     const panels = element.closest(".panels").children.length;
     const width = printing ? (panels > 1 ? FULL_PAGE_PX / 2 - 12 : FULL_PAGE_PX) : element.clientWidth;
-    const download = { format: "svg", filename: name };
+    plot.width = width;
     return Plotly.react(element, spec.data.map((trace) => themed(trace)), layoutOf(spec, width), {
       displaylogo: false, responsive: false, displayModeBar: "hover",
-      modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d", "toImage"],
-      modeBarButtonsToAdd: ["png", "svg"].map((format) => ({
-        name: `download-${format}`, title: `Download as ${format.toUpperCase()}`, icon: Plotly.Icons.camera,
-        click: (graph) => Plotly.downloadImage(graph, { ...download, format, scale: 2 }),
-      })),
+      modeBarButtons: [["resetScale2d", saveButton("png", Plotly.Icons.camera, name), saveButton("svg", Plotly.Icons.disk, name)]],
     });
   };
   const drawAll = () => plots.forEach(draw);
@@ -87,19 +91,20 @@
   };
   drawNext(0);
 
-  let pending = 0, lastWidth = window.innerWidth;
-  window.addEventListener("resize", () => {
-    if (printing || window.innerWidth === lastWidth) return;
-    lastWidth = window.innerWidth;
+  let pending = 0;
+  const resized = new ResizeObserver(() => {
     clearTimeout(pending);
-    pending = setTimeout(drawAll, 100);
+    pending = setTimeout(() => {
+      if (!printing) plots.filter((plot) => plot.width && plot.width !== plot.element.clientWidth).forEach(draw);
+    }, 100);
   });
+  plots.forEach((plot) => resized.observe(plot.element));
   window.addEventListener("beforeprint", () => { printing = true; drawAll(); });
   window.addEventListener("afterprint", () => { printing = false; drawAll(); });
   systemDark.addEventListener("change", drawAll);
 
   const button = document.getElementById("theme");
-  const names = { "": "Theme: system", light: "Theme: light", dark: "Theme: dark" };
+  const names = { "": "Auto", light: "Light", dark: "Dark" };
   const setTheme = (theme) => {
     if (theme) root.dataset.theme = theme; else delete root.dataset.theme;
     button.textContent = names[theme];

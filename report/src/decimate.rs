@@ -31,6 +31,15 @@ pub fn indices_keeping_extremes(columns: &[&[f64]], limit: usize) -> Vec<usize> 
     kept.into_iter().collect()
 }
 
+/// Indices of at most `limit` entries spread evenly over `length`: for clouds of points, whose density
+/// would be falsified by keeping extremes.
+pub fn even_sample(length: usize, limit: usize) -> Vec<usize> {
+    if length <= limit {
+        return (0..length).collect();
+    }
+    (0..limit).map(|k| k * length / limit).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,6 +72,15 @@ mod tests {
             let of_kept = kept.iter().map(|&i| column[i]).fold(f64::NEG_INFINITY, f64::max);
             assert_eq!(of_all.to_bits(), of_kept.to_bits());
         }
+    }
+
+    #[test]
+    fn an_even_sample_keeps_the_share_of_rare_entries() {
+        // Every tenth entry is marked; a sample with a stride prime to ten keeps the share.
+        let sample = even_sample(7 * MAX_POINTS, MAX_POINTS);
+        assert_eq!(sample.len(), MAX_POINTS);
+        assert_eq!(sample.iter().filter(|&&i| i % 10 == 0).count(), MAX_POINTS / 10);
+        assert_eq!(even_sample(3, 5), [0, 1, 2]);
     }
 
     #[test]

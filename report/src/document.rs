@@ -6,7 +6,8 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::html::{escape, json_for_script, prose};
-use crate::{Figure, ReportError, Table};
+use crate::trace::Thinning;
+use crate::{Figure, MAX_POINTS, ReportError, Table};
 
 const STYLE: &str = include_str!("../assets/report.css");
 const SCRIPT: &str = include_str!("../assets/report.js");
@@ -138,7 +139,7 @@ impl Document {
              <meta name=\"color-scheme\" content=\"light dark\">\n\
              <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
              <header><h1>{title}</h1>\
-             <button type=\"button\" id=\"theme\" aria-label=\"Colour theme\" hidden></button></header>\n\
+             <button type=\"button\" id=\"theme\" title=\"Colour theme\" aria-label=\"Colour theme\" hidden></button></header>\n\
              <noscript><p class=\"verdict fails\">The figures need JavaScript, which is switched off; \
              text and tables are complete.</p></noscript>\n\
              <main>\n{body}</main>\n{foot}{plotly}<script>\n{SCRIPT}</script>\n</body>\n</html>\n"
@@ -159,6 +160,7 @@ impl Document {
     }
 
     fn foot(&self) -> String {
+<<<<<<< HEAD
         let commands: String = self
             .commands
             .iter()
@@ -166,6 +168,11 @@ impl Document {
                 format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command))
             })
             .collect();
+=======
+        let commands = each(&self.commands, |(what, command)| {
+            format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command))
+        });
+>>>>>>> report
         let heading = if commands.is_empty() { "" } else { "<h2>Reproduce</h2>\n" };
         format!(
             "<footer>\n{heading}{commands}<p class=\"fine\">Made by Pleiad. This file is complete in itself and fetches \
@@ -188,18 +195,24 @@ impl Block {
                 format!("<p class=\"verdict {class}\"><b>{word}</b> {}</p>\n", prose(text))
             }
             Self::Facts(facts) => {
+<<<<<<< HEAD
                 let items: String = facts
                     .iter()
                     .map(|(key, value)| {
                         format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value))
                     })
                     .collect();
+=======
+                let items = each(facts, |(key, value)| {
+                    format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value))
+                });
+>>>>>>> report
                 format!("<dl>\n{items}</dl>\n")
             }
             Self::Section(heading) => format!("<h2>{}</h2>\n", escape(heading)),
             Self::Prose(text) => format!("<p>{}</p>\n", prose(text)),
             Self::List(items) => {
-                let items: String = items.iter().map(|item| format!("<li>{}</li>\n", prose(item))).collect();
+                let items = each(items, |item| format!("<li>{}</li>\n", prose(item)));
                 format!("<ul>\n{items}</ul>\n")
             }
             Self::Table(table) => {
@@ -214,8 +227,14 @@ impl Block {
     }
 }
 
+/// The HTML of every item, joined.
+fn each<T>(items: &[T], html: impl Fn(&T) -> String) -> String {
+    items.iter().map(html).collect()
+}
+
 fn render_figure(panels: &[Panel], caption: &str, numbers: &mut Numbers) -> String {
     let number = numbers.figures;
+<<<<<<< HEAD
     let mut html =
         format!("<figure id=\"figure-{number}\">\n<div class=\"panels panels-{}\">\n", panels.len().min(3));
     for panel in panels {
@@ -232,16 +251,52 @@ fn render_figure(panels: &[Panel], caption: &str, numbers: &mut Numbers) -> Stri
             escape(caption),
             json_for_script(&panel.figure.to_json())
         );
+=======
+    let spoken = escape(caption);
+    let mut drawn = String::new();
+    for panel in panels {
+        numbers.plots += 1;
+        drawn += &render_panel(panel, numbers.plots, &spoken);
+>>>>>>> report
     }
-    let thinned = if panels.iter().any(|panel| panel.figure.is_thinned()) {
-        format!(" Long series are thinned to about {} points each; every peak is kept.", crate::MAX_POINTS)
+    let any = |thinning| panels.iter().any(|panel| panel.figure.has(thinning));
+    let thinned = if any(Thinning::ToExtremes) {
+        format!(" Long series are thinned to at most {MAX_POINTS} points each; every peak is kept.")
     } else {
         String::new()
     };
+<<<<<<< HEAD
     html + &format!(
         "</div>\n<figcaption><b>Figure {number}.</b> {}{thinned}</figcaption>\n</figure>\n",
         prose(caption)
     )
+=======
+    let sampled = if any(Thinning::EvenSample) {
+        format!(" Of very many points an even sample of {MAX_POINTS} is drawn.")
+    } else {
+        String::new()
+    };
+    format!(
+        "<figure id=\"figure-{number}\">\n<div class=\"panels panels-{}\">\n{drawn}</div>\n\
+         <figcaption><b>Figure {number}.</b> {}{thinned}{sampled}</figcaption>\n</figure>\n",
+        panels.len().min(3),
+        prose(caption)
+    )
+}
+
+fn render_panel(panel: &Panel, plot: usize, spoken: &str) -> String {
+    let (class, heading) = if panel.heading.is_empty() {
+        ("panel", String::new())
+    } else {
+        ("panel headed", format!("<h3>{}</h3>", escape(&panel.heading)))
+    };
+    format!(
+        "<div class=\"{class}\">{heading}\
+         <div class=\"plot\" id=\"plot-{plot}\" role=\"img\" aria-label=\"{spoken}\"></div>\
+         <script type=\"application/json\">{}</script></div>\n",
+        json_for_script(&panel.figure.to_json())
+    )
+>>>>>>> report
 }
 
 /// Writes beside `path` and renames, so that no half-written file is ever seen under its name.

@@ -4,6 +4,7 @@ use serde_json::{Map, Value, json};
 
 use crate::Trace;
 use crate::html::label;
+use crate::trace::Thinning;
 
 /// An axis: what it shows, in which unit.
 #[derive(Clone, Debug, PartialEq)]
@@ -163,14 +164,9 @@ impl Figure {
         self
     }
 
-    /// Whether a series was too long to show every point of it.
-    pub fn is_thinned(&self) -> bool {
-        self.traces.iter().any(|trace| trace.thinned)
-    }
-
-    /// Whether there is nothing to draw.
-    pub fn is_empty(&self) -> bool {
-        self.traces.is_empty()
+    /// Whether some of the figure's traces leave points out in this way.
+    pub(crate) fn has(&self, thinning: Thinning) -> bool {
+        self.traces.iter().any(|trace| trace.thinning == thinning)
     }
 
     /// `{data, layout, aspect}` for the script of the page; `aspect` is height by width of a map.
@@ -184,7 +180,12 @@ impl Figure {
         let row = trace.row.min(self.rows.len() - 1);
         json.insert("yaxis".into(), axis_name("y", row).into());
         if !json.contains_key("hoverinfo") {
+<<<<<<< HEAD
             let name = json.get("name").and_then(Value::as_str).unwrap_or_default();
+=======
+            let own = json.get("name").and_then(Value::as_str).unwrap_or_default();
+            let name = trace.hover_name.as_deref().unwrap_or(own);
+>>>>>>> report
             let hover =
                 format!("{}<br>{}<extra>{name}</extra>", self.x.hover("x"), self.rows[row].hover("y"));
             json.insert("hovertemplate".into(), hover.into());

@@ -25,7 +25,7 @@ mod trace;
 
 pub use accuracy::Accuracy;
 pub use chi_square::{CONFIDENCE_95_TWO_DIMENSIONS, two_sided_95};
-pub use decimate::{MAX_POINTS, indices_keeping_extremes};
+pub use decimate::{MAX_POINTS, even_sample, indices_keeping_extremes};
 pub use document::{Document, Panel, Verdict};
 pub use ellipse::ellipse_points;
 pub use error::ReportError;

@@ -11,7 +11,7 @@ pub fn quantity(value: f64, unit: &str) -> String {
     let magnitude = value.abs();
     let number = if magnitude == 0.0 {
         "0".to_owned()
-    } else if magnitude < 5e-4 || magnitude >= 1e7 {
+    } else if !(5e-4..1e7).contains(&magnitude) {
         format!("{value:.2e}")
     } else if magnitude >= 99.95 {
         grouped(value.abs().round(), value < 0.0)
@@ -30,7 +30,7 @@ pub(crate) fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
     for (position, digit) in digits.chars().enumerate() {
-        if position > 0 && (digits.len() - position) % 3 == 0 {
+        if position > 0 && (digits.len() - position).is_multiple_of(3) {
             text.push(',');
         }
         text.push(digit);
@@ -53,6 +53,16 @@ pub(crate) fn bytes(value: u64) -> String {
     } else {
         quantity(value / 1e6, "MB")
     }
+}
+
+/// A duration: seconds below two minutes, else minutes and seconds.
+pub(crate) fn duration(seconds: f64) -> String {
+    if !seconds.is_finite() || seconds < 120.0 {
+        return quantity(seconds, "s");
+    }
+    let whole = seconds.round();
+    let (minutes, rest) = ((whole / 60.0).floor(), whole % 60.0);
+    if rest == 0.0 { format!("{minutes} min") } else { format!("{minutes} min {rest} s") }
 }
 
 /// The values as JSON with as many digits as a picture shows: an error of at most 5e-6 of their span
@@ -110,6 +120,9 @@ mod tests {
     fn counts_and_bytes_are_readable() {
         assert_eq!(count(7), "7");
         assert_eq!(count(1_234_567), "1,234,567");
+        assert_eq!(duration(90.0), "90.0 s");
+        assert_eq!(duration(1_500.2), "25 min");
+        assert_eq!(duration(150.0), "2 min 30 s");
         assert_eq!(bytes(512), "512 B");
         assert_eq!(bytes(1_234_567), "1.23 MB");
     }

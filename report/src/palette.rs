@@ -46,6 +46,16 @@ impl Dash {
         [Self::Dash, Self::Solid, Self::Dot, Self::DashDot][index % 4]
     }
 
+    /// For people.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Solid => "solid",
+            Self::Dash => "dashed",
+            Self::Dot => "dotted",
+            Self::DashDot => "dash-dotted",
+        }
+    }
+
     /// As Plotly takes it.
     pub(crate) fn code(self) -> &'static str {
         match self {

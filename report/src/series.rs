@@ -71,6 +71,28 @@ impl TeamSeries {
     pub fn check(&self) -> Result<(), ReportError> {
         self.robots.iter().try_for_each(RobotSeries::check)
     }
+
+    /// The team's position sigma from `from_s` to `to_s` (both included): the root mean square of the
+    /// robots' position sigmas at all instants between, metres. `None` if there is no instant between.
+    pub fn position_sigma_m(&self, from_s: f64, to_s: f64) -> Option<f64> {
+        let (mut count, mut sum) = (0_u32, 0.0);
+        for robot in &self.robots {
+            for (time_s, sigma_m) in robot.time_s.iter().zip(robot.position_sigma_m()) {
+                if (from_s..=to_s).contains(time_s) {
+                    count += 1;
+                    sum += sigma_m * sigma_m;
+                }
+            }
+        }
+        (count > 0).then(|| (sum / f64::from(count)).sqrt())
+    }
+
+    /// Position error against truth, root mean square over robots and instants, metres; `None` without any
+    /// truth.
+    pub fn position_rmse_m(&self) -> Option<f64> {
+        let errors: Vec<[f64; 3]> = self.robots.iter().flat_map(RobotSeries::errors).collect();
+        Accuracy::of_errors(&errors).map(|accuracy| accuracy.position_rmse_m)
+    }
 }
 
 impl RobotSeries {
@@ -155,5 +177,13 @@ mod tests {
         };
         assert_eq!(robot.position_sigma_m(), [5.0; 3]);
         assert!((robot.true_distance_m().unwrap() - 6.0).abs() < 1e-12);
+        let mut other = robot.clone();
+        other.covariance[2] = Symmetric3::diagonal(1.0, 0.0, 1.0);
+        let team = TeamSeries { robots: vec![robot, other] };
+        // sqrt((25 + 25 + 25 + 1) / 4)
+        assert!((team.position_sigma_m(1.0, 2.0).unwrap() - 19.0_f64.sqrt()).abs() < 1e-12);
+        assert!(team.position_sigma_m(2.5, 9.0).is_none());
+        // Distances 0, 5, sqrt(34), twice.
+        assert!((team.position_rmse_m().unwrap() - (59.0_f64 / 3.0).sqrt()).abs() < 1e-12);
     }
 }

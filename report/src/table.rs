@@ -36,27 +36,24 @@ impl Table {
     /// The table as HTML, numbered for reference.
     pub(crate) fn render(&self, number: usize) -> String {
         let class = |column: usize| if self.numeric[column] { " class=\"number\"" } else { "" };
-        let mut html = format!(
-            "<div class=\"table\"><table id=\"table-{number}\">\n<caption><b>Table {number}.</b> {}</caption>\n\
-             <thead><tr>",
+        let heading = |(column, title): (usize, &String)| {
+            format!("<th scope=\"col\"{}>{}</th>", class(column), escape(title))
+        };
+        let cell = |(column, text): (usize, &String)| match column {
+            0 => format!("<th scope=\"row\">{}</th>", prose(text)),
+            _ => format!("<td{}>{}</td>", class(column), prose(text)),
+        };
+        let row = |cells: &Vec<String>| {
+            format!("<tr>{}</tr>\n", cells.iter().enumerate().map(cell).collect::<String>())
+        };
+        let header: String = self.header.iter().enumerate().map(heading).collect();
+        let rows: String = self.rows.iter().map(row).collect();
+        // The caption stands below the table and not inside it: on a narrow screen the table scrolls.
+        format!(
+            "<div class=\"table\"><table id=\"table-{number}\" aria-labelledby=\"caption-{number}\">\n\
+             <thead><tr>{header}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n\
+             <p class=\"caption\" id=\"caption-{number}\"><b>Table {number}.</b> {}</p>\n",
             prose(&self.caption)
-        );
-        for (column, title) in self.header.iter().enumerate() {
-            html += &format!("<th scope=\"col\"{}>{}</th>", class(column), escape(title));
-        }
-        html += "</tr></thead>\n<tbody>\n";
-        for row in &self.rows {
-            html += "<tr>";
-            for (column, cell) in row.iter().enumerate() {
-                let text = prose(cell);
-                html += &if column == 0 {
-                    format!("<th scope=\"row\">{text}</th>")
-                } else {
-                    format!("<td{}>{text}</td>", class(column))
-                };
-            }
-            html += "</tr>\n";
-        }
-        html + "</tbody>\n</table></div>\n"
+        )
     }
 }

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::MAX_POINTS;
-use crate::decimate::indices_keeping_extremes;
+use crate::decimate::{even_sample, indices_keeping_extremes};
 use crate::html::label;
 use crate::number::compact;
 use crate::palette::{Colour, Dash};
@@ -12,19 +12,31 @@ use crate::palette::{Colour, Dash};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trace {
     pub(crate) json: Map<String, Value>,
+    pub(crate) hover_name: Option<String>,
     pub(crate) row: usize,
-    pub(crate) thinned: bool,
+    pub(crate) thinning: Thinning,
+}
+
+/// Which points of a long series are left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Thinning {
+    /// None.
+    None,
+    /// Those between the extremes of short runs.
+    ToExtremes,
+    /// All but an even sample.
+    EvenSample,
 }
 
 impl Trace {
     /// A line through `(x, y)`; entries that are not finite are gaps.
     pub fn line(name: &str, x: &[f64], y: &[f64], colour: Colour) -> Self {
-        Self::series(name, x, y, &[y], MAX_POINTS, colour, "lines")
+        Self::thinned_line(name, x, y, &[y], colour)
     }
 
     /// A line in the plane, whose horizontal extremes matter as much as its vertical ones.
     pub fn path(name: &str, x: &[f64], y: &[f64], colour: Colour) -> Self {
-        Self::series(name, x, y, &[x, y], MAX_POINTS, colour, "lines")
+        Self::thinned_line(name, x, y, &[x, y], colour)
     }
 
     /// A line that holds each value until the next.
@@ -32,28 +44,31 @@ impl Trace {
         Self::line(name, x, y, colour).with_line("shape", "hv".into())
     }
 
-    /// Points of `size_px` with a symbol of Plotly's (`circle`, `circle-open`, `x`, `diamond`).
+    /// Points of `size_px`, of very many an even sample, with a symbol of Plotly's (`circle`, `circle-open`, `x`, `diamond`).
     pub fn markers(name: &str, x: &[f64], y: &[f64], colour: Colour, symbol: &str, size_px: f64) -> Self {
-        let mut trace = Self::series(name, x, y, &[y], MAX_POINTS, colour, "markers");
-        trace.json.remove("line");
-        trace.json.insert(
-            "marker".into(),
-            json!({"color": colour.code(), "symbol": symbol, "size": size_px, "line": {"width": 1.5, "color": colour.code()}}),
-        );
-        trace
+        let length = x.len().min(y.len());
+        let kept = even_sample(length, MAX_POINTS);
+        let mut trace = Self::scatter(name, x, y, &kept, "markers");
+        if kept.len() < length {
+            trace.thinning = Thinning::EvenSample;
+        }
+        let outline = json!({"width": 1.5, "color": colour.code()});
+        let marker = json!({"color": colour.code(), "symbol": symbol, "size": size_px, "line": outline});
+        trace.with("marker", marker)
     }
 
     /// The area between two curves over `x`, filled; instants where one is not finite are left out.
     pub fn band(name: &str, x: &[f64], lower: &[f64], upper: &[f64], colour: Colour) -> Self {
-        let kept = indices_keeping_extremes(&[lower, upper], MAX_POINTS / 2);
         let length = x.len().min(lower.len()).min(upper.len());
+        let kept = indices_keeping_extremes(&[&lower[..length], &upper[..length]], MAX_POINTS / 2);
         let inside = |&&i: &&usize| x[i].is_finite() && lower[i].is_finite() && upper[i].is_finite();
         let kept_inside: Vec<usize> = kept.iter().filter(inside).copied().collect();
         let around = |ahead: &[f64], back: &[f64]| -> Vec<f64> {
             let there = kept_inside.iter().map(|&i| ahead[i]);
             there.chain(kept_inside.iter().rev().map(|&i| back[i])).collect()
         };
-        Self::area(name, &around(x, x), &around(upper, lower), colour, kept.len() < length)
+        let thinning = if kept.len() < length { Thinning::ToExtremes } else { Thinning::None };
+        Self::area(name, &around(x, x), &around(upper, lower), colour, thinning)
     }
 
     /// Filled polygons, each closed by its first point.
@@ -62,7 +77,7 @@ impl Trace {
         let points: Vec<[f64; 2]> =
             outlines.iter().flat_map(|outline| outline.iter().copied().chain([gap])).collect();
         let column = |axis: usize| points.iter().map(|point| point[axis]).collect::<Vec<f64>>();
-        let mut trace = Self::area(name, &column(0), &column(1), colour, false);
+        let mut trace = Self::area(name, &column(0), &column(1), colour, Thinning::None);
         trace.json.insert("line".into(), json!({"color": colour.code(), "width": 1}));
         trace
     }
@@ -76,7 +91,7 @@ impl Trace {
             "y": compact(values),
             "marker": {"color": colour.code()},
         });
-        Self::from_json(json, false)
+        Self::from_json(json, Thinning::None)
     }
 
     /// The pattern of the line.
@@ -104,14 +119,15 @@ impl Trace {
         self.with("legendgroup", group.into())
     }
 
-    /// The heading of its group in the legend.
-    pub fn group_heading(self, heading: &str) -> Self {
-        self.with("legendgrouptitle", json!({"text": label(heading)}))
-    }
-
     /// Hidden until chosen in the legend.
     pub fn on_request(self) -> Self {
         self.with("visible", "legendonly".into())
+    }
+
+    /// Another name under the pointer than in the legend.
+    pub fn hover_name(mut self, name: &str) -> Self {
+        self.hover_name = Some(label(name));
+        self
     }
 
     /// Says nothing under the pointer.
@@ -125,31 +141,24 @@ impl Trace {
         self
     }
 
-    fn series(
-        name: &str,
-        x: &[f64],
-        y: &[f64],
-        columns: &[&[f64]],
-        limit: usize,
-        colour: Colour,
-        mode: &str,
-    ) -> Self {
+    fn thinned_line(name: &str, x: &[f64], y: &[f64], columns: &[&[f64]], colour: Colour) -> Self {
         let length = x.len().min(y.len());
-        let mut kept = indices_keeping_extremes(columns, limit);
-        kept.retain(|&i| i < length);
-        let pick = |column: &[f64]| compact(&kept.iter().map(|&i| column[i]).collect::<Vec<f64>>());
-        let json = json!({
-            "type": "scatter",
-            "mode": mode,
-            "name": label(name),
-            "x": pick(x),
-            "y": pick(y),
-            "line": {"color": colour.code(), "width": 1.75},
-        });
-        Self::from_json(json, kept.len() < length)
+        let columns: Vec<&[f64]> = columns.iter().map(|column| &column[..length]).collect();
+        let kept = indices_keeping_extremes(&columns, MAX_POINTS);
+        let mut trace = Self::scatter(name, x, y, &kept, "lines");
+        if kept.len() < length {
+            trace.thinning = Thinning::ToExtremes;
+        }
+        trace.with("line", json!({"color": colour.code(), "width": 1.75}))
     }
 
-    fn area(name: &str, x: &[f64], y: &[f64], colour: Colour, thinned: bool) -> Self {
+    fn scatter(name: &str, x: &[f64], y: &[f64], kept: &[usize], mode: &str) -> Self {
+        let pick = |column: &[f64]| compact(&kept.iter().map(|&i| column[i]).collect::<Vec<f64>>());
+        let json = json!({"type": "scatter", "mode": mode, "name": label(name), "x": pick(x), "y": pick(y)});
+        Self::from_json(json, Thinning::None)
+    }
+
+    fn area(name: &str, x: &[f64], y: &[f64], colour: Colour, thinning: Thinning) -> Self {
         let json = json!({
             "type": "scatter",
             "mode": "lines",
@@ -161,12 +170,12 @@ impl Trace {
             "line": {"color": colour.code(), "width": 0},
             "hoverinfo": "skip",
         });
-        Self::from_json(json, thinned)
+        Self::from_json(json, thinning)
     }
 
-    fn from_json(json: Value, thinned: bool) -> Self {
+    fn from_json(json: Value, thinning: Thinning) -> Self {
         let json = if let Value::Object(map) = json { map } else { Map::new() };
-        Self { json, row: 0, thinned }
+        Self { json, hover_name: None, row: 0, thinning }
     }
 
     fn with(mut self, key: &str, value: Value) -> Self {
@@ -190,7 +199,7 @@ mod tests {
     fn what_is_not_finite_is_a_gap() {
         let trace = Trace::line("a", &[0.0, 1.0, 2.0], &[1.0, f64::NAN, 3.0], Colour::Ink);
         assert_eq!(trace.json["y"], json!([1.0, null, 3.0]));
-        assert!(!trace.thinned);
+        assert_eq!(trace.thinning, Thinning::None);
     }
 
     #[test]
@@ -205,7 +214,7 @@ mod tests {
     fn long_series_say_that_they_are_thinned() {
         let x: Vec<f64> = (0..100_000).map(f64::from).collect();
         let trace = Trace::line("a", &x, &x, Colour::Series(0));
-        assert!(trace.thinned);
+        assert_eq!(trace.thinning, Thinning::ToExtremes);
         assert!(trace.json["x"].as_array().unwrap().len() <= MAX_POINTS);
     }
 

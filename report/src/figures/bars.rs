@@ -2,7 +2,8 @@
 
 use crate::{Axis, Colour, Figure, ReportError, Trace};
 
-/// Bars of several groups over named categories; `groups` are names and one value per category.
+/// Bars of several groups over named categories; a group is its name, its colour and
+/// one value per category.
 ///
 /// # Errors
 /// [`ReportError::BarCount`] if a group has another number of values than there are categories.
@@ -10,10 +11,10 @@ pub fn bar_figure(
     category: &str,
     categories: &[String],
     value: Axis,
-    groups: &[(&str, Vec<f64>)],
+    groups: &[(&str, Colour, Vec<f64>)],
 ) -> Result<Figure, ReportError> {
     let mut figure = Figure::new(Axis::category(category), value.from_zero()).height(340);
-    for (index, (name, values)) in groups.iter().enumerate() {
+    for (name, colour, values) in groups {
         if values.len() != categories.len() {
             return Err(ReportError::BarCount {
                 name: (*name).to_owned(),
@@ -21,7 +22,7 @@ pub fn bar_figure(
                 expected: categories.len(),
             });
         }
-        figure = figure.trace(Trace::bars(name, categories, values, Colour::Series(index)));
+        figure = figure.trace(Trace::bars(name, categories, values, *colour));
     }
     Ok(figure)
 }
@@ -34,7 +35,12 @@ mod tests {
     fn a_group_of_another_length_is_refused() {
         let categories = ["a".to_owned(), "b".to_owned()];
         let error =
+<<<<<<< HEAD
             bar_figure("robot", &categories, Axis::new("RMSE", "m"), &[("online", vec![1.0])]).unwrap_err();
+=======
+            bar_figure("robot", &categories, Axis::new("RMSE", "m"), &[("online", Colour::Ink, vec![1.0])])
+                .unwrap_err();
+>>>>>>> report
         assert!(error.to_string().contains("1 values for 2 categories"), "{error}");
     }
 }

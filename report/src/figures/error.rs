@@ -6,9 +6,9 @@ use crate::{Axis, Colour, Figure, Panel, ReportError, RobotSeries, TeamSeries, T
 /// first absolute observation, where the bounds may be huge, would otherwise flatten everything else.
 const SCALE_QUANTILE: f64 = 0.9;
 
-const COMPONENTS: [(&str, &str); 3] = [("x error", "m"), ("y error", "m"), ("heading error", "rad")];
+const COMPONENTS: [(&str, &str); 3] = [("x error", "m"), ("y error", "m"), ("yaw error", "rad")];
 
-/// One panel per robot with known truth: error of x, y (metres, map frame) and heading (radians) over
+/// One panel per robot with known truth: error of x, y (metres, map frame) and yaw (radians) over
 /// time within the filter's own three-sigma bounds. All panels have the same scales. The heading says
 /// how many of the errors lie within the bounds.
 ///
@@ -59,7 +59,7 @@ fn panel(robot: &RobotSeries, colour: Colour, limits: [f64; 3]) -> Panel {
             );
     }
     let share = share_within_three_sigma(robot)
-        .map_or(String::new(), |share| format!(": {:.1} % within three sigma", 100.0 * share));
+        .map_or(String::new(), |share| format!(": {:.1} % within 3σ", 100.0 * share));
     Panel { heading: format!("Robot {}{share}", robot.robot), figure }
 }
 

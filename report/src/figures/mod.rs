@@ -10,7 +10,7 @@ pub use bars::bar_figure;
 pub use error::{error_figures, share_within_three_sigma};
 pub use map::{Extent, map_figure};
 pub use nis::{nis_figure, share_within_bounds};
-pub use sigma::sigma_figure;
+pub use sigma::{sigma_figure, sigma_patterns};
 
 use pleiad_estimation::RobotId;
 

@@ -1,7 +1,7 @@
 //! The report of the observability demonstration.
 
-use crate::figures::{Extent, error_figures, map_figure, sigma_figure};
-use crate::number::{bytes, count};
+use crate::figures::{Extent, error_figures, map_figure, sigma_figure, sigma_patterns};
+use crate::number::{bytes, count, duration};
 use crate::reports::{MAP_CAPTION, SIGMA_MEANING};
 use crate::{Document, Panel, ReportError, Table, TeamSeries, Verdict, quantity};
 
@@ -79,7 +79,7 @@ impl DemoCase {
         } else {
             format!("the team's position sigma stays bounded, {early} early and {late} late")
         };
-        format!("With `{}`, rank {} of {}: {course}.", self.name, self.rank, self.dimension)
+        format!("With “{}”, rank {} of {}: {course}.", self.name, self.rank, self.dimension)
     }
 }
 
@@ -97,10 +97,10 @@ pub fn demo_report(demo: &DemoReport) -> Result<Document, ReportError> {
     let mut document = Document::new("A team of robots is one estimator: what it can and cannot know")
         .lead(format!(
             "{} robots drive for {} and localize as one distributed Kalman filter that no machine owns. \
-             Seeing only each other, they know how they stand to one another but lose where they are; \
-             an absolute observation of a single robot holds all of them.",
+             Theory says: seeing only each other, they know how they stand to one another but lose where they are; \
+             absolute observations of a single robot hold all of them.",
             demo.robots,
-            quantity(demo.seconds, "s")
+            duration(demo.seconds)
         ))
         .verdict(verdict, sentences.join(" "))
         .table(comparison(demo))
@@ -110,8 +110,9 @@ pub fn demo_report(demo: &DemoReport) -> Result<Document, ReportError> {
     document = document.figure(
         sigma_figure(&cases)?,
         format!(
-            "Position sigma of every robot in every case on one axis: colour tells the robot, line pattern the case; the \
-             labels give the root mean square over the robots at the end. {SIGMA_MEANING}"
+            "Position sigma of every robot in every case on one axis. Colour tells the robot, line pattern the case \
+             ({}); the labels give the root mean square over the robots at the end. {SIGMA_MEANING}",
+            sigma_patterns(&cases)
         ),
     );
     document = document.section("Where they thought they were").panels(maps(demo)?, maps_caption());
@@ -177,7 +178,7 @@ fn errors(mut document: Document, demo: &DemoReport) -> Result<Document, ReportE
         document = document.panels(
             error_figures(&case.series)?,
             format!(
-                "{}: error of x, y and heading (line) within three sigma (grey) for every robot, in the map frame, at one \
+                "{}: error of x, y and yaw (line) within three sigma (grey) for every robot, in the map frame, at one \
                  scale. Bounds beyond the frame are cut.",
                 sentence_case(&case.name)
             ),
@@ -192,15 +193,16 @@ fn explanation(mut document: Document, demo: &DemoReport) -> Document {
          or turned as one. Three directions of the joint state (x, y and heading of the team as a whole) therefore never \
          show in any such observation: the observability matrix of N robots has rank 3N − 3 of 3N. Along these directions \
          odometry noise adds up and nothing takes it away, so the sigmas grow without bound, although the robots know \
-         their places relative to each other well. One absolute observation of one robot makes the rank full, and the \
-         correlations that the joint filter keeps carry it to every other robot.",
+         their places relative to each other well. Absolute observations of one robot (a position now and then \
+         while it moves is enough) make the rank full, and the correlations that the joint filter keeps carry them to \
+         every other robot.",
     );
     for case in &demo.cases {
         if case.unobservable.is_empty() {
             continue;
         }
         document = document
-            .prose(format!("Directions that nothing observes in the case `{}`:", case.name))
+            .prose(format!("Directions that nothing observes in the case “{}”:", case.name))
             .list(case.unobservable.clone());
     }
     document

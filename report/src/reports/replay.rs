@@ -3,9 +3,15 @@
 use pleiad_estimation::RobotId;
 
 use crate::figures::{bar_figure, error_figures, map_figure, nis_figure, share_within_bounds, sigma_figure};
-use crate::number::count;
+use crate::number::{count, duration};
 use crate::reports::{MAP_CAPTION, SIGMA_MEANING};
+<<<<<<< HEAD
 use crate::{Accuracy, Axis, Document, Landmark, NisSeries, Panel, ReportError, Table, TeamSeries, quantity};
+=======
+use crate::{
+    Accuracy, Axis, Colour, Document, Landmark, NisSeries, Panel, ReportError, Table, TeamSeries, quantity,
+};
+>>>>>>> report
 
 /// What a run or a replay showed.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +87,7 @@ fn team_report(report: &ReplayReport, title: &str) -> Result<Document, ReportErr
     let mut document = Document::new(title)
         .lead(lead(report))
         .fact("Robots", report.series.robots.len().to_string())
-        .fact("Duration", quantity(report.seconds, "s"))
+        .fact("Duration", duration(report.seconds))
         .fact("Facts used", count(report.facts.iter().map(|fact| fact.used).sum()));
     for (key, value) in &report.highlights {
         document = document.fact(key, value);
@@ -110,7 +116,7 @@ fn team_report(report: &ReplayReport, title: &str) -> Result<Document, ReportErr
     if !errors.is_empty() {
         document = document.section("Errors against the filter's own bounds").panels(
             errors,
-            "Error of x, y and heading (line) within three sigma (grey) for every robot with known truth, in the map frame, \
+            "Error of x, y and yaw (line) within three sigma (grey) for every robot with known truth, in the map frame, \
              at one scale. A consistent filter keeps 99.7 % within. Bounds beyond the frame are cut.",
         );
     }
@@ -191,11 +197,11 @@ fn scores_figure(scores: &[RobotScore]) -> Result<crate::Figure, ReportError> {
     let values = |of: &dyn Fn(&RobotScore) -> Option<Accuracy>| -> Vec<f64> {
         scores.iter().map(|score| of(score).map_or(f64::NAN, |accuracy| accuracy.position_rmse_m)).collect()
     };
-    let mut groups = vec![("settled", values(&|score| score.settled))];
+    let mut groups = vec![("settled", Colour::Series(0), values(&|score| score.settled))];
     if scores.iter().any(|score| score.online.is_some()) {
-        groups.push(("online", values(&|score| score.online)));
+        groups.push(("online", Colour::Series(4), values(&|score| score.online)));
     }
-    groups.push(("odometry alone", values(&|score| score.dead_reckoning)));
+    groups.push(("odometry alone", Colour::Muted, values(&|score| score.dead_reckoning)));
     bar_figure("robot", &robots, Axis::new("position error, RMS", "m"), &groups)
 }
 
@@ -217,12 +223,12 @@ fn innovations(mut document: Document, report: &ReplayReport) -> Result<Document
     let mut panels = Vec::new();
     for series in report.nis.iter().filter(|series| !series.points.is_empty()) {
         let share = share_within_bounds(series)?
-            .map_or(String::new(), |share| format!(": {:.1} % of used within bounds", 100.0 * share));
+            .map_or(String::new(), |share| format!(": {:.1} % within bounds", 100.0 * share));
         panels.push(Panel { heading: format!("{}{share}", series.name), figure: nis_figure(series)? });
     }
     Ok(document.panels(
         panels,
-        "Normalized innovation squared (NIS) of every observation. Of a consistent filter 95 % lie between the dashed \
+        "Normalized innovation squared (NIS) of every observation. The share within bounds is that of the used ones. Of a consistent filter 95 % lie between the dashed \
          bounds; many above mean that it is too sure of itself, many below that it is too cautious.",
     ))
 }
