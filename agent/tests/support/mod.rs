@@ -169,7 +169,8 @@ pub fn entry(id: EntryId, body: Body) -> Entry {
     Entry { id, body, extension: Vec::new() }
 }
 
-/// The log of a robot that stands at the origin, was placed there at time 0, and saw others: `(when, whom)`.
+/// The log of a robot that stands at the origin, was placed there at time 0, and saw others, `(when, whom)`,
+/// where robot 1 would be had it started at time 0.
 pub fn standing_log(robot: u32, fold: FoldConfig, saw: &[(f64, u32)]) -> Vec<Entry> {
     let still = NominalState { nominal: Pose2::identity(), noise_sum: Symmetric3::zero() };
     let boot = Boot {
@@ -186,7 +187,7 @@ pub fn standing_log(robot: u32, fold: FoldConfig, saw: &[(f64, u32)]) -> Vec<Ent
     let mut bodies =
         vec![Body::Boot(boot), observation(0.0, Quantity::Absolute(Absolute::Pose(Pose2::identity())))];
     bodies.extend(saw.iter().map(|(time_s, whom)| {
-        let relative = Relative::Pose(Pose2::new(1.0, 0.5, 0.2));
+        let relative = Relative::Pose(on_circle(start(), *time_s));
         observation(*time_s, Quantity::Robot { robot: RobotId(*whom), relative })
     }));
     (0..).zip(bodies).map(|(sequence, body)| entry(id(robot, 0, sequence), body)).collect()
