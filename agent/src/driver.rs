@@ -376,20 +376,25 @@ impl<B: Bus + Clone> Agent<'_, B> {
         let mut ack = SensorAck { number: batch.number, ..SensorAck::default() };
         let (mut records, mut entries, mut rest) = (Vec::new(), Vec::new(), Vec::new());
         for sample in batch.samples {
-            let mut refused = false;
+            // A sample that is taken is always journalled; one that is not never is.
+            let mut taken = false;
             for command in self.node.handle(Event::Sample(sample)) {
                 match command {
-                    Command::Journal(more) => records.extend(more),
-                    Command::Publish(more) => entries.extend(more),
-                    Command::Notice(Notice::SampleRefused(refusal)) => {
-                        refused = true;
-                        ack.first_refusal.get_or_insert_with(|| refusal.to_string());
-                        rest.push(Command::Notice(Notice::SampleRefused(refusal)));
+                    Command::Journal(more) => {
+                        taken |= more.iter().any(|record| matches!(record, Record::Sample(_)));
+                        records.extend(more);
                     }
+                    Command::Publish(more) => entries.extend(more),
                     other => rest.push(other),
                 }
             }
-            if refused { ack.refused += 1 } else { ack.accepted += 1 }
+            if taken {
+                ack.accepted += 1;
+            } else {
+                ack.refused += 1;
+                let reason = || self.node.last_refusal().map(|refusal| refusal.to_string());
+                ack.first_refusal = ack.first_refusal.or_else(reason);
+            }
         }
         if batch.end {
             rest.extend(self.node.handle(Event::InputEnded));

@@ -212,7 +212,8 @@ impl Node {
             let ours = held.get(&theirs.log);
             let from = ours.map_or(0, |ours| ours.held);
             if theirs.held > from {
-                let useless = self.foreign.contains(&theirs.log) || self.ledger.quarantined().contains(&robot);
+                let useless =
+                    self.foreign.contains(&theirs.log) || self.ledger.quarantined().contains(&robot);
                 if own && self.boot == Some(boot) {
                     let id = EntryId { robot, boot, sequence: Sequence(theirs.held - 1) };
                     self.notice(Notice::OwnLogAhead { id });

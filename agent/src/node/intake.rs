@@ -66,17 +66,19 @@ pub enum SampleRefusal {
 }
 
 /// How many samples were taken, left out on purpose, and refused for which reason.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Counts {
     pub accepted: u64,
     pub refused: u64,
     pub reasons: BTreeMap<String, u64>,
+    pub last: Option<SampleRefusal>,
 }
 
 impl Counts {
     /// Counts a refusal; `true` for the first of its kind, which is worth a notice.
     pub(super) fn refuse(&mut self, refusal: &SampleRefusal) -> bool {
         self.refused += 1;
+        self.last = Some(*refusal);
         let debug = format!("{refusal:?}");
         let kind = debug.split([' ', '(', '{']).next().unwrap_or_default();
         let count = self.reasons.entry(kind.to_owned()).or_insert(0);

@@ -131,7 +131,9 @@ fn a_peer_of_another_configuration_is_named_and_nothing_is_exchanged() {
 fn versions() -> [Vec<Entry>; 2] {
     let log = standing_log(2, node(1).config().fold, &[(0.5, 3), (0.6, 3)]);
     let mut other = log.clone();
-    let Some(Entry { body: Body::Observation(fact), .. }) = other.last_mut() else { panic!("no observation") };
+    let Some(Entry { body: Body::Observation(fact), .. }) = other.last_mut() else {
+        panic!("no observation")
+    };
     fact.quantity = Quantity::Absolute(Absolute::Position([9.0, 9.0]));
     [log, other]
 }

@@ -8,7 +8,8 @@ use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_protocol::Estimate;
 
 use crate::support::{
-    FORWARD_M_S, YAW_RATE_RAD_S, agent, assert_pose, circle, feed, node_of, on_circle, sample, start, velocity,
+    FORWARD_M_S, YAW_RATE_RAD_S, agent, assert_pose, circle, feed, node_of, on_circle, sample, start,
+    velocity,
 };
 
 const RADIUS_M: f64 = 0.06;

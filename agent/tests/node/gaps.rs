@@ -2,7 +2,9 @@
 //! on, and the unseen motion enters as the squared motion limits times the gap.
 
 use pleiad_agent::{Event, Node, Notice};
-use pleiad_estimation::fact::{Answer, Body, Boot, Continuation, Entry, EntryId, Half, NominalState, Quantity};
+use pleiad_estimation::fact::{
+    Answer, Body, Boot, Continuation, Entry, EntryId, Half, NominalState, Quantity,
+};
 use pleiad_estimation::reference::{ErrorForm, JointEkf, facts_from_entries};
 use pleiad_estimation::sample::{Reading, Relative, Target};
 use pleiad_estimation::symmetric::Symmetric3;
@@ -59,7 +61,9 @@ fn a_longer_gap_begins_a_continued_boot_where_the_last_one_ended() {
     assert_eq!(handled.notices, [Notice::OdometryGap { from, to, boot: BootIndex(1) }]);
     let [_, (index, boot)] = boots(&node)[..] else { panic!("{:?}", boots(&node)) };
     assert_eq!((index, boot.time), (BootIndex(1), seconds(13.0)));
-    let Some(Continuation { previous, time, last, gap }) = boot.continuation else { panic!("no continuation") };
+    let Some(Continuation { previous, time, last, gap }) = boot.continuation else {
+        panic!("no continuation")
+    };
     assert_eq!((previous, time), (BootIndex(0), seconds(11.0)));
     assert_pose(&last.nominal, &on_circle(start(), 1.0), 1e-12);
     assert!((last.noise_sum.0[5] - 1e-4).abs() < 1e-15, "yaw noise of a second");
@@ -162,7 +166,9 @@ fn cross_terms_survive_a_gap_as_in_the_reference_filter() {
 /// The identity of robot 1's only observation of a robot.
 fn observation_of(node: &Node, robot: u32) -> EntryId {
     let names = |entry: &&Entry| match entry.body {
-        Body::Observation(fact) => matches!(fact.quantity, Quantity::Robot { robot: RobotId(b), .. } if b == robot),
+        Body::Observation(fact) => {
+            matches!(fact.quantity, Quantity::Robot { robot: RobotId(b), .. } if b == robot)
+        }
         _ => false,
     };
     held(node).iter().find(names).expect("an observation").id

@@ -6,8 +6,8 @@ use pleiad_estimation::BootIndex;
 use pleiad_estimation::fact::{Answer, Half, NominalState, VoidReason};
 
 use crate::support::{
-    Handled, agent, assert_pose, drive, feed, halves, handle, id, node, node_of, on_circle, standing_log, start,
-    velocity,
+    Handled, agent, assert_pose, drive, feed, halves, handle, id, node, node_of, on_circle, standing_log,
+    start, velocity,
 };
 
 /// Hands the log of a robot 2 that saw robot 1 at these times.

@@ -7,8 +7,8 @@ use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 
 use crate::support::{
-    agent, assert_pose, drive, feed, gps, handle, node, node_of, observations, on_circle, sample, seconds, sees,
-    sighting, start, velocity,
+    agent, assert_pose, drive, feed, gps, handle, node, node_of, observations, on_circle, sample, seconds,
+    sees, sighting, start, velocity,
 };
 
 fn driving() -> Node {
@@ -81,9 +81,8 @@ fn refused_samples_leave_no_trace_and_are_counted_by_reason() {
     let out_of_order =
         |t| SampleRefusal::Odometry(OdometryRefusal::OutOfOrder { time: seconds(t), last: seconds(11.0) });
     let seen = |target, relative| sighting(10.5, target, relative);
-    let odometry = |forward_m_s, yaw_rate_rad_s| {
-        sample(11.1, Reading::Velocity { forward_m_s, yaw_rate_rad_s })
-    };
+    let odometry =
+        |forward_m_s, yaw_rate_rad_s| sample(11.1, Reading::Velocity { forward_m_s, yaw_rate_rad_s });
     let range = |range_m| Relative::Range { range_m };
     let table: Vec<(Sample, SampleRefusal)> = vec![
         (velocity(11.0), out_of_order(11.0)),
@@ -105,10 +104,7 @@ fn refused_samples_leave_no_trace_and_are_counted_by_reason() {
         (seen(robot(2), range(-1.0)), bad),
         (seen(robot(2), Relative::RangeBearing { range_m: -1.0, bearing_rad: 0.0 }), bad),
         (seen(landmark(8), range(1.0)), SampleRefusal::UnknownLandmark(LandmarkId(8))),
-        (
-            seen(landmark(7), Relative::Pose(Pose2::identity())),
-            SampleRefusal::LandmarkPose(LandmarkId(7)),
-        ),
+        (seen(landmark(7), Relative::Pose(Pose2::identity())), SampleRefusal::LandmarkPose(LandmarkId(7))),
         (seen(robot(1), range(1.0)), SampleRefusal::Itself(RobotId(1))),
         (gps(9.0), SampleRefusal::BeforeBoot { time: seconds(9.0) }),
     ];

@@ -53,7 +53,11 @@ pub fn world(seed: u64, robots: u32, seconds: f64) -> World {
     let mut truth: BTreeMap<u32, Pose2> = BTreeMap::new();
     let mut configs = BTreeMap::new();
     for robot in 1..=robots {
-        let place = Pose2::new(f64::from(robot) * 12.0, random.random_range(-9.0..9.0), random.random_range(-3.0..3.0));
+        let place = Pose2::new(
+            f64::from(robot) * 12.0,
+            random.random_range(-9.0..9.0),
+            random.random_range(-3.0..3.0),
+        );
         let mut config = agent(robot);
         config.output.estimate_rate_hz = 2.0;
         let prior = config.prior.as_mut().expect("a prior");
@@ -172,7 +176,8 @@ impl Net {
                     }
                 }
                 Command::Publish(entries) => {
-                    let peers: Vec<RobotId> = self.nodes.keys().copied().filter(|peer| *peer != robot).collect();
+                    let peers: Vec<RobotId> =
+                        self.nodes.keys().copied().filter(|peer| *peer != robot).collect();
                     for peer in peers {
                         self.send(peer, || Message::Entries(entries.clone()));
                     }
@@ -203,7 +208,8 @@ impl Net {
     /// A new process from the journal.
     pub fn restart(&mut self, robot: RobotId) {
         self.crash = None;
-        let records: Vec<Record> = self.journals.get(&robot).into_iter().flatten().flatten().cloned().collect();
+        let records: Vec<Record> =
+            self.journals.get(&robot).into_iter().flatten().flatten().cloned().collect();
         let config = self.configs[&robot].node().expect("a valid configuration");
         self.nodes.insert(robot, Node::recover(config, self.random.random(), records));
     }
@@ -261,7 +267,8 @@ impl Net {
     pub fn statuses(&mut self) {
         let statuses: Vec<_> = self.nodes.values_mut().map(Node::status).collect();
         for status in statuses {
-            let peers: Vec<RobotId> = self.nodes.keys().copied().filter(|peer| *peer != status.robot).collect();
+            let peers: Vec<RobotId> =
+                self.nodes.keys().copied().filter(|peer| *peer != status.robot).collect();
             for peer in peers {
                 self.event(peer, Event::Status(status.clone()));
             }
