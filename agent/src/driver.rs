@@ -24,12 +24,12 @@ use crate::journal::{Journal, JournalError};
 use crate::node::{Command, Event, Node, Notice, Record, SettledEstimate};
 use crate::results::{self, ResultsError};
 
-/// A peer that does not answer a request for facts is asked again at its next status.
+/// How long a peer has to answer. For facts it is asked again at its next status.
 const ASK_TIMEOUT: Duration = Duration::from_secs(2);
-/// How long an agent without a journal looks for a peer that may know a former life of its robot, and how
-/// long it waits for one peer's answer and for the next peer.
+/// How long an agent without a journal looks for a first peer that may know a former life of its robot, and
+/// then for the next one.
 const REJOIN_LIMIT: Duration = Duration::from_secs(1);
-const REJOIN_TIMEOUT: Duration = Duration::from_millis(200);
+const REJOIN_NEXT: Duration = Duration::from_millis(200);
 
 /// Why an agent ended.
 #[derive(Debug, thiserror::Error)]
@@ -170,13 +170,13 @@ impl<B: Bus + Clone> Agent<'_, B> {
         let mut answered = false;
         loop {
             // Links may still be coming up, so that nobody there yet is not nobody there.
-            let patience = if answered { tokio::time::Instant::now() + REJOIN_TIMEOUT } else { limit };
+            let patience = if answered { tokio::time::Instant::now() + REJOIN_NEXT } else { limit };
             let Ok(Some(peer)) = tokio::time::timeout_at(patience.min(limit), present.recv()).await else {
                 return Ok(());
             };
             let Some(robot) = self.sender(&peer.key).filter(|_| peer.alive) else { continue };
             let key = keys::of(&self.team, robot, Kind::Control);
-            let Ok(reply) = self.bus.request(&key, question.clone(), REJOIN_TIMEOUT).await else { continue };
+            let Ok(reply) = self.bus.request(&key, question.clone(), ASK_TIMEOUT).await else { continue };
             if let Ok(Message::ControlReply(ControlReply::Status(status))) = Message::decode(&reply) {
                 answered = true;
                 self.act(Event::Status(status)).await?;

@@ -195,7 +195,7 @@ fn entries_of_the_own_boot_that_were_never_said_here_are_noticed_and_not_taken()
     let mine = held(&one);
     assert!(handle(&mut one, Event::Entries(mine.clone())).notices.is_empty(), "copies are no news");
     let size = mine.len() as u64;
-    let foreign = Entry { id: id(1, 0, size), ..mine[size as usize - 1].clone() };
+    let foreign = Entry { id: id(1, 0, size), ..mine.last().unwrap().clone() };
     let handled = handle(&mut one, Event::Entries(vec![foreign]));
     assert_eq!(handled.notices, [Notice::OwnLogAhead { id: id(1, 0, size) }]);
     assert!(handled.journal.is_empty());

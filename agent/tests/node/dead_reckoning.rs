@@ -1,6 +1,6 @@
 //! Dead reckoning from every kind of odometry against the closed form of the motion.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, SQRT_2};
 
 use pleiad_agent::{AgentConfig, Node};
 use pleiad_estimation::Pose2;
@@ -67,8 +67,9 @@ fn a_velocity_holds_from_its_stamp_to_the_next() {
     let mut node = node_of(&agent(1), 1);
     let reading = |forward_m_s| Reading::Velocity { forward_m_s, yaw_rate_rad_s: 0.0 };
     let samples = [(0.0, 1.0), (1.0, 0.5), (2.0, 0.0), (3.0, 9.0)].map(|(t, v)| sample(t, reading(v)));
-    let along = |distance: f64| start().compose(&Pose2::new(distance, 0.0, 0.0));
-    check(&mut node, samples, |t| along([0.0, 1.0, 1.5, 1.5][t as usize]));
+    // A metre in the first second, half in the next, none after.
+    let along = |t: f64| t.min(1.0) + 0.5 * (t - 1.0).clamp(0.0, 1.0);
+    check(&mut node, samples, |t| start().compose(&Pose2::new(along(t), 0.0, 0.0)));
 }
 
 #[test]
@@ -86,8 +87,9 @@ fn four_increments_around_a_square_come_back() {
     let samples = ticks(4, 1.0).map(|t| sample(t, Reading::Increment(corner)));
     // The first one is motion from before the boot.
     check(&mut node, samples, |t| {
-        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
-        let (x, y) = corners[t as usize];
+        // Each corner is the one before turned by 90 degrees about the centre.
+        let angle = FRAC_PI_2 * t - 3.0 * FRAC_PI_4;
+        let (x, y) = (0.5 + angle.cos() / SQRT_2, 0.5 + angle.sin() / SQRT_2);
         start().compose(&Pose2::new(x, y, FRAC_PI_2 * t))
     });
 }

@@ -99,6 +99,9 @@ fn what_was_seen_before_anything_is_known_of_oneself_is_answered_at_the_first_od
     assert_eq!(state(found[1].1).1.nominal, start());
 }
 
+/// Configuration, stretches of odometry, when the robot was seen, and what is expected.
+type Case<'a, T> = (&'a AgentConfig, &'a [(f64, f64)], f64, T);
+
 #[test]
 fn voids_have_their_reason() {
     let mut short = agent(1);
@@ -106,7 +109,7 @@ fn voids_have_their_reason() {
     let whole = agent(1);
     let drive = [(10.0, 11.0)];
     let two_boots = [(10.0, 11.0), (15.0, 16.0)];
-    let table: [(&AgentConfig, &[(f64, f64)], f64, VoidReason); 7] = [
+    let table: [Case<VoidReason>; 7] = [
         (&whole, &drive, 9.999, VoidReason::BeforeBoot),
         (&whole, &two_boots, 9.999, VoidReason::BeforeBoot),
         (&whole, &two_boots, 13.0, VoidReason::OdometryGap),
@@ -120,7 +123,7 @@ fn voids_have_their_reason() {
         assert_eq!(answer_after(config, stretches, seen_s), Answer::Void(reason), "seen at {seen_s} s");
     }
     // The neighbours that have an answer.
-    let neighbours: [(&AgentConfig, &[(f64, f64)], f64, u32); 5] = [
+    let neighbours: [Case<u32>; 5] = [
         (&whole, &drive, 10.0, 0),
         (&whole, &two_boots, 11.0, 0),
         (&whole, &two_boots, 10.5, 0),

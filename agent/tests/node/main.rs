@@ -1,5 +1,7 @@
 //! The node as a pure state machine: events in, commands and state out. One file per property.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "helpers of tests are tests")]
+
 #[path = "../support/mod.rs"]
 mod support;
 

@@ -4,6 +4,7 @@ use pleiad_agent::{Event, Node, Notice, SampleRefusal};
 use pleiad_estimation::fact::{Absolute, NoiseRef, Quantity};
 use pleiad_estimation::motion::OdometryRefusal;
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
+use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 
 use crate::support::{
@@ -37,7 +38,7 @@ fn an_observation_at_the_very_first_odometry_is_a_fact() {
     let mut node = driving();
     let [fact] = observations(&feed(&mut node, gps(10.0)).published)[..] else { panic!("no fact") };
     assert_eq!(fact.observer.nominal, start());
-    assert_eq!(fact.observer.noise_sum.0, [0.0; 6]);
+    assert_eq!(fact.observer.noise_sum, Symmetric3::zero());
 }
 
 #[test]
