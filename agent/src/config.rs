@@ -226,10 +226,12 @@ pub enum YawName {
     Gyro,
 }
 
-/// `[sensors.*]`: one standard deviation per component.
+/// `[sensors]`: one standard deviation per component, and what is known to be off.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorsSection {
+    /// Known bias of every range reading, subtracted, m.
+    pub range_bias_m: f64,
     /// Full relative pose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relative_pose: Option<PoseNoise>,
@@ -612,6 +614,7 @@ impl SensorsSection {
     }
 
     fn check(&self) -> Result<(), ConfigError> {
+        finite("sensors.range_bias_m", self.range_bias_m)?;
         let length = |noise: &Option<LengthNoise>| noise.as_ref().map(|noise| noise.sigma_m);
         let angle = |noise: &Option<AngleNoise>| noise.as_ref().map(|noise| noise.sigma_rad);
         let (pose, polar) = (self.relative_pose.as_ref(), self.range_bearing.as_ref());

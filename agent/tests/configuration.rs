@@ -288,6 +288,7 @@ fn a_value_out_of_its_range_is_refused_with_file_key_and_what_would_be_right() {
             "sensors.relative_position.sigma_m = NaN",
             positive,
         ),
+        (sensor("range_bias_m = inf"), "sensors.range_bias_m = inf", finite),
         (sensor("range = { sigma_m = inf }"), "sensors.range.sigma_m = inf", positive),
         (sensor("bearing = { sigma_rad = 0.0 }"), "sensors.bearing.sigma_rad = 0", positive),
         (

@@ -68,12 +68,18 @@ pub struct Joint {
     form: ErrorForm,
     members: Vec<Member>,
     covariance: JointCovariance,
+    updates: u64,
 }
 
 impl Joint {
     /// No robot yet.
     pub fn new(form: ErrorForm) -> Self {
-        Self { form, members: Vec::new(), covariance: JointCovariance::default() }
+        Self { form, members: Vec::new(), covariance: JointCovariance::default(), updates: 0 }
+    }
+
+    /// How many measurements went into it.
+    pub fn updates(&self) -> u64 {
+        self.updates
     }
 
     /// The robots that have a place in the map, in the order of their rows in the covariance.
@@ -215,6 +221,7 @@ impl Joint {
         if nis > threshold {
             return Update::Rejected { nis, threshold };
         }
+        self.updates += 1;
         self.covariance.downdate(&prepared);
         for (index, member) in self.members.iter_mut().enumerate().filter(|(_, member)| member.placed) {
             let delta = prepared.correction(index);

@@ -3,22 +3,25 @@
 //! The estimate is a function of the set of entries in gap-free prefixes: the order of arrival,
 //! duplicates and batches leave no trace in it.
 
+mod counts;
+mod history;
 mod log;
 mod snapshots;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+pub use counts::FactCounts;
+pub use history::SettledPoint;
 pub use log::{Log, LogDigest};
 use snapshots::Snapshots;
 
 use crate::fact::{
-    Absolute, Answer, Body, Entry, EntryId, Fingerprint, LogId, Noise, NoiseRef, NominalState, Observation,
-    Quantity, VoidReason,
+    Answer, Body, Entry, EntryId, Fingerprint, LogId, Noise, NoiseRef, NominalState, Observation, Quantity,
+    VoidReason,
 };
-use crate::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, fold};
-use crate::geometry::Matrix3;
+use crate::fold::{Fact, FactKey, FoldConfig, Residual, fold};
 use crate::joint::Joint;
-use crate::{BootIndex, Pose2, RobotId, Timestamp};
+use crate::{BootIndex, RobotId, Timestamp};
 
 /// A fact in the order of the fold, and what became of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,45 +69,6 @@ pub enum Refusal {
     /// Too many entries wait for a missing one; it will be asked for again.
     #[error("too far ahead of the first missing entry of its log")]
     TooFarAhead,
-}
-
-/// Counts of facts by what became of them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FactCounts {
-    /// Complete observations of robots by robots.
-    pub relative: usize,
-    /// Observations against the map: GPS, heading, landmarks, poses.
-    pub absolute: usize,
-    /// Updated the joint.
-    pub used: usize,
-    /// Refused by the gate.
-    pub rejected: usize,
-    /// Complete, but could not be folded.
-    pub skipped: usize,
-    /// Wait for their other half.
-    pub pending: usize,
-    /// Answered with a reason why there is no other half.
-    pub void: usize,
-}
-
-/// A robot's part of the joint after one fact: a point of its settled history.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SettledPoint {
-    /// Time of the fact.
-    pub time: Timestamp,
-    /// On the trajectory of which boot the correction applies.
-    pub boot: BootIndex,
-    /// A copy of the joint's view of the robot, enough to give its estimate until the next fact.
-    view: SettledView,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct SettledView {
-    correction: Pose2,
-    block: Matrix3,
-    folded_noise: crate::symmetric::Symmetric3,
-    nominal: Pose2,
-    form: crate::joint::ErrorForm,
 }
 
 /// All that is known, and the estimate that follows from it.
@@ -402,36 +366,6 @@ impl Ledger {
         self.void.iter()
     }
 
-    /// Counts by what became of the facts at the last [`Ledger::settle`].
-    pub fn counts(&self) -> FactCounts {
-        let mut counts =
-            FactCounts { pending: self.pending.len(), void: self.void.len(), ..FactCounts::default() };
-        for record in self.facts.values() {
-            let Fact::Observation { quantity, .. } = &record.fact else { continue };
-            match quantity {
-                Quantity::Robot { .. } => counts.relative += 1,
-                Quantity::Landmark { .. }
-                | Quantity::Absolute(Absolute::Position(_) | Absolute::Heading(_)) => {
-                    counts.absolute += 1;
-                }
-                Quantity::Absolute(Absolute::Pose(_)) => {
-                    // A prior is not an observation of the run.
-                    if record.residual.is_some_and(|residual| residual.outcome == Outcome::Placed) {
-                        continue;
-                    }
-                    counts.absolute += 1;
-                }
-            }
-            match record.residual.map(|residual| residual.outcome) {
-                Some(Outcome::Used) => counts.used += 1,
-                Some(Outcome::Rejected { .. }) => counts.rejected += 1,
-                Some(Outcome::Skipped(_)) => counts.skipped += 1,
-                Some(Outcome::Booted | Outcome::Placed) | None => {}
-            }
-        }
-        counts
-    }
-
     /// Hash of the bits of the estimate and of the prefixes it is a function of. Two robots with equal
     /// fingerprints hold the same facts and believe the same.
     pub fn fingerprint(&mut self) -> Fingerprint {
@@ -442,41 +376,5 @@ impl Ledger {
             .filter(|(_, log)| log.held() > 0)
             .flat_map(|(id, log)| [u64::from(id.robot.0), u64::from(id.boot.0), log.held()]);
         Fingerprint::of_words(prefixes.chain(self.joint.words()))
-    }
-
-    /// Folds all facts once more from the beginning and gives, for one robot, its part of the joint after
-    /// each: the *settled* history, in which the estimate at t rests on all facts up to t.
-    pub fn settled_history(&self, robot: RobotId) -> Vec<SettledPoint> {
-        let mut joint = Joint::new(self.config.form);
-        let mut points = Vec::new();
-        for (key, record) in &self.facts {
-            fold(&mut joint, &self.config, key, &record.fact);
-            let Some((member, index)) = joint.member(robot).zip(joint.index(robot)) else { continue };
-            let view = SettledView {
-                correction: member.correction,
-                block: joint.covariance().block(index, index),
-                folded_noise: member.folded_noise,
-                nominal: member.nominal,
-                form: self.config.form,
-            };
-            points.push(SettledPoint { time: key.time, boot: member.boot, view });
-        }
-        points
-    }
-}
-
-impl SettledPoint {
-    /// The estimate and its covariance (position in the map, yaw) at `state` of the nominal trajectory,
-    /// until the next fact.
-    pub fn estimate(&self, state: &NominalState) -> (Pose2, crate::symmetric::Symmetric3) {
-        let view = &self.view;
-        crate::joint::extrapolate(
-            view.form,
-            &view.correction,
-            &view.nominal,
-            view.folded_noise,
-            &view.block,
-            state,
-        )
     }
 }

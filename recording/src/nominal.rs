@@ -110,7 +110,7 @@ const RANGE_SENSOR: &[Key<NominalRangeSensor>] = keys! { NominalRangeSensor;
 const ROBOT: &[Key<NominalRobot>] = keys! { NominalRobot;
     wheel_radius, Absent::Refused, Domain::Positive;
     track_width, Absent::Refused, Domain::Positive;
-    encoder_ticks_per_rev, Absent::Refused, Domain::Positive;
+    encoder_ticks_per_rev, Absent::Refused, Domain::NotNegative;
     servo_time_constant_s, Absent::Refused, Domain::NotNegative;
     servo_time_constant_turn_s, Absent::Refused, Domain::NotNegative;
     command_latency_s, Absent::Ideal(0.0), Domain::Any;

@@ -111,6 +111,7 @@ pub struct NominalRangeSensor {
 pub struct NominalRobot {
     pub wheel_radius: f64,
     pub track_width: f64,
+    /// 0 where the encoder is believed to be exact.
     pub encoder_ticks_per_rev: f64,
     pub servo_time_constant_s: f64,
     pub servo_time_constant_turn_s: f64,
@@ -128,6 +129,18 @@ pub struct NominalRobot {
 }
 
 impl RobotRecording {
+    /// Appends a sample to the channel it belongs to; it has to be later than what the channel holds.
+    pub fn push(&mut self, sample: Sample) {
+        let channel = match sample.reading {
+            Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_) => &mut self.odometry,
+            Reading::Gyro { .. } => &mut self.gyro,
+            Reading::Gps { .. } => &mut self.gps,
+            Reading::Heading { .. } => &mut self.heading,
+            Reading::Sighting { .. } => &mut self.sightings,
+        };
+        channel.push(sample);
+    }
+
     /// All samples an agent is fed, merged by time. At equal stamps odometry and gyro come before what
     /// was observed, so that an observation at the time of an odometry sample can be placed at once.
     pub fn samples(&self) -> Vec<Sample> {

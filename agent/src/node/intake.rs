@@ -211,6 +211,7 @@ impl Node {
             }
             Reading::Sighting { target, relative } => {
                 let profile = SensorsSection::relative_profile(&relative);
+                let relative = without_bias(relative, self.config.sensors.range_bias_m);
                 match target {
                     Target::Robot(robot) if robot == self.config.robot => Err(SampleRefusal::Itself(robot)),
                     Target::Robot(robot) => Ok((Quantity::Robot { robot, relative }, profile)),
@@ -229,6 +230,17 @@ impl Node {
             | Reading::Increment(_)
             | Reading::Gyro { .. } => Err(SampleRefusal::BadValue { time: sample.time }),
         }
+    }
+}
+
+/// A range as it would be without its known bias.
+fn without_bias(relative: Relative, bias_m: f64) -> Relative {
+    match relative {
+        Relative::Range { range_m } => Relative::Range { range_m: range_m - bias_m },
+        Relative::RangeBearing { range_m, bearing_rad } => {
+            Relative::RangeBearing { range_m: range_m - bias_m, bearing_rad }
+        }
+        other => other,
     }
 }
 

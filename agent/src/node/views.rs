@@ -44,7 +44,7 @@ impl Node {
             map_from_robot,
             covariance,
             sigma: [xx, yy, yaw].map(|variance| variance.max(0.0).sqrt()),
-            facts_used: self.ledger.counts().used as u64,
+            facts_used: joint.updates(),
         })
     }
 

@@ -209,3 +209,25 @@ fn an_independent_robot_makes_no_facts_of_other_robots_but_of_the_map() {
     let landmark = sighting(10.5, Target::Landmark(LandmarkId(7)), Relative::Range { range_m: 5.0 });
     assert_eq!(observations(&feed(&mut node, landmark).published).len(), 1);
 }
+
+#[test]
+fn a_known_range_bias_is_subtracted_from_ranges_and_from_nothing_else() {
+    let mut config = agent(1);
+    config.sensors.range_bias_m = 0.25;
+    let read_and_said = [
+        (Relative::Range { range_m: 2.0 }, Relative::Range { range_m: 1.75 }),
+        (
+            Relative::RangeBearing { range_m: 2.0, bearing_rad: 0.5 },
+            Relative::RangeBearing { range_m: 1.75, bearing_rad: 0.5 },
+        ),
+        (Relative::Position { x_m: 2.0, y_m: 0.5 }, Relative::Position { x_m: 2.0, y_m: 0.5 }),
+        (Relative::Bearing { bearing_rad: 0.5 }, Relative::Bearing { bearing_rad: 0.5 }),
+    ];
+    for (read, said) in read_and_said {
+        let mut node = node_of(&config, 1);
+        drive(&mut node, 10.0, 11.0, 0.1);
+        let handled = feed(&mut node, sighting(10.5, Target::Robot(RobotId(2)), read));
+        let [fact] = observations(&handled.published)[..] else { panic!("no fact") };
+        assert_eq!(fact.quantity, Quantity::Robot { robot: RobotId(2), relative: said });
+    }
+}

@@ -15,8 +15,7 @@ use crate::geometry::{Matrix3, Vector2, Vector3};
 use crate::symmetric::Symmetric3;
 use crate::{BootIndex, Pose2, RobotId, Timestamp};
 
-/// Upper 0.1 % points of the chi-square distribution with 1, 2 and 3 degrees of freedom.
-pub const DEFAULT_GATE: [f64; 3] = [10.828, 13.816, 16.266];
+pub use crate::fold::DEFAULT_GATE;
 
 /// The joint extended Kalman filter over facts, as a function from a list of facts to an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]

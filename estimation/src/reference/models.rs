@@ -7,18 +7,11 @@
 use nalgebra::{DMatrix, DVector, Matrix2};
 
 use crate::Pose2;
+pub use crate::joint::ErrorForm;
+
 use crate::fact::{Absolute, Quantity};
 use crate::geometry::{Matrix3, Vector2};
 use crate::sample::Relative;
-
-/// Which error the covariance speaks of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ErrorForm {
-    /// Right-invariant: `X = exp(xi) X_hat`, `xi` in the map frame.
-    Invariant,
-    /// Textbook: the differences of x, y and yaw.
-    Additive,
-}
 
 /// What became of a fact.
 #[derive(Clone, Copy, Debug, PartialEq)]

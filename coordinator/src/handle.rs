@@ -1,0 +1,153 @@
+//! Talking to agents and to the supervisor of their processes, and the steps by which a process is ended.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use pleiad_bus::Bus;
+use pleiad_protocol::{ControlReply, ControlRequest, RobotId, TeamName};
+use tokio::sync::{mpsc, oneshot, watch};
+use tokio::time::Instant;
+
+use crate::membership::Member;
+use crate::process::ProcessSignal;
+use crate::restart::Exit;
+use crate::supervisor::{Members, Request};
+use crate::{CoordinatorError, control};
+
+/// How long a process may take to end after a signal.
+const GRACE: Duration = Duration::from_secs(5);
+/// How long a process whose agreement to end was not heard may take to end all the same.
+const LAST_WORDS: Duration = Duration::from_secs(1);
+
+/// How a process came to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum How {
+    /// It had ended before.
+    Before,
+    /// It was asked through the bus.
+    Asked,
+    /// It was sent SIGTERM.
+    Terminated,
+    /// It was sent SIGKILL.
+    Killed,
+}
+
+/// The end of an agent's process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Departure {
+    /// What it took.
+    pub how: How,
+    /// How it ended.
+    pub exit: Exit,
+}
+
+/// What it takes to talk to agents and to their supervisor.
+#[derive(Clone)]
+pub(crate) struct Handle<B> {
+    pub(crate) bus: B,
+    pub(crate) team: TeamName,
+    pub(crate) requests: mpsc::Sender<Request>,
+    pub(crate) members: watch::Receiver<Members>,
+}
+
+impl<B: Bus + Clone> Handle<B> {
+    pub(crate) async fn ask_all(
+        &self,
+        robots: &BTreeSet<RobotId>,
+        request: ControlRequest,
+        timeout: Duration,
+    ) -> BTreeMap<RobotId, Result<ControlReply, CoordinatorError>> {
+        control::ask_all(&self.bus, &self.team, robots, request, timeout).await
+    }
+
+    pub(crate) async fn request<T>(
+        &self,
+        request: Request,
+        answer: oneshot::Receiver<T>,
+    ) -> Result<Option<T>, CoordinatorError> {
+        self.requests.send(request).await.map_err(|_| CoordinatorError::Unsupervised)?;
+        Ok(answer.await.ok())
+    }
+
+    pub(crate) async fn hold(&self, robots: BTreeSet<RobotId>) -> Result<(), CoordinatorError> {
+        let (done, answer) = oneshot::channel();
+        self.request(Request::Hold { robots, done }, answer).await?;
+        Ok(())
+    }
+
+    /// A process that has ended in the meantime needs no signal.
+    pub(crate) async fn signal(&self, robot: RobotId, signal: ProcessSignal) -> Result<(), CoordinatorError> {
+        let (done, answer) = oneshot::channel();
+        match self.request(Request::Signal { robot, signal, done }, answer).await? {
+            Some(Err(cause)) => Err(CoordinatorError::Signal { robot, signal, cause }),
+            Some(Ok(())) | None => Ok(()),
+        }
+    }
+
+    /// Waits until this is so, or the time is over.
+    pub(crate) async fn wait_for(
+        &self,
+        timeout: Duration,
+        is_so: impl FnMut(&Members) -> bool,
+    ) -> Result<(), CoordinatorError> {
+        let mut members = self.members.clone();
+        match tokio::time::timeout(timeout, members.wait_for(is_so)).await {
+            Ok(Err(_)) => Err(CoordinatorError::Unsupervised),
+            Ok(Ok(_)) | Err(_) => Ok(()),
+        }
+    }
+
+    fn member(&self, robot: RobotId) -> Result<Member, CoordinatorError> {
+        self.members.borrow().get(&robot).copied().ok_or(CoordinatorError::UnknownRobot { robot })
+    }
+
+    /// How the process ended, if it has within this time.
+    pub(crate) async fn ended(
+        &self,
+        robot: RobotId,
+        within: Duration,
+    ) -> Result<Option<Exit>, CoordinatorError> {
+        let ended = |members: &Members| members.get(&robot).is_none_or(|member| member.ended().is_some());
+        self.wait_for(within, ended).await?;
+        Ok(self.member(robot)?.ended())
+    }
+
+    /// Ends a process that is not to be restarted. An agent that is not up cannot be asked.
+    pub(crate) async fn end(&self, robot: RobotId, timeout: Duration) -> Result<Departure, CoordinatorError> {
+        let member = self.member(robot)?;
+        if let Some(exit) = member.ended() {
+            return Ok(Departure { how: How::Before, exit });
+        }
+        if member.alive {
+            let deadline = Instant::now() + timeout;
+            let asked = control::ask(&self.bus, &self.team, robot, ControlRequest::Shutdown, timeout).await;
+            match asked.and_then(|reply| control::accepted(robot, &reply)) {
+                Ok(()) => {
+                    let left = deadline.saturating_duration_since(Instant::now());
+                    if let Some(exit) = self.ended(robot, left).await? {
+                        return Ok(Departure { how: How::Asked, exit });
+                    }
+                }
+                Err(error) => {
+                    // The answer can be lost while its sender ends.
+                    if let Some(exit) = self.ended(robot, LAST_WORDS).await? {
+                        return Ok(Departure { how: How::Asked, exit });
+                    }
+                    tracing::warn!(robot = robot.0, %error, "the agent did not agree to end");
+                }
+            }
+        }
+        self.signal(robot, ProcessSignal::Terminate).await?;
+        if let Some(exit) = self.ended(robot, GRACE).await? {
+            return Ok(Departure { how: How::Terminated, exit });
+        }
+        self.signal(robot, ProcessSignal::Kill).await?;
+        Ok(Departure { how: How::Killed, exit: self.killed(robot).await? })
+    }
+
+    /// Waits for the end of a killed process.
+    pub(crate) async fn killed(&self, robot: RobotId) -> Result<Exit, CoordinatorError> {
+        let pid = self.member(robot)?.pid().unwrap_or_default();
+        self.ended(robot, GRACE).await?.ok_or(CoordinatorError::StillRunning { robot, pid })
+    }
+}

@@ -1,0 +1,60 @@
+//! The settled history of a robot: its part of the joint after every fact, in the order of the fold.
+
+use super::Ledger;
+use crate::fact::NominalState;
+use crate::fold::fold;
+use crate::geometry::Matrix3;
+use crate::joint::{ErrorForm, Joint, extrapolate};
+use crate::symmetric::Symmetric3;
+use crate::{BootIndex, Pose2, RobotId, Timestamp};
+
+/// A robot's part of the joint after one fact: a point of its settled history.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettledPoint {
+    /// Time of the fact.
+    pub time: Timestamp,
+    /// On the trajectory of which boot the correction applies.
+    pub boot: BootIndex,
+    /// A copy of the joint's view of the robot, enough to give its estimate until the next fact.
+    view: SettledView,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct SettledView {
+    correction: Pose2,
+    block: Matrix3,
+    folded_noise: Symmetric3,
+    nominal: Pose2,
+    form: ErrorForm,
+}
+
+impl Ledger {
+    /// Folds all facts once more from the beginning and gives, for one robot, its part of the joint after
+    /// each: the *settled* history, in which the estimate at t rests on all facts up to t.
+    pub fn settled_history(&self, robot: RobotId) -> Vec<SettledPoint> {
+        let mut joint = Joint::new(self.config.form);
+        let mut points = Vec::new();
+        for (key, record) in &self.facts {
+            fold(&mut joint, &self.config, key, &record.fact);
+            let Some((member, index)) = joint.member(robot).zip(joint.index(robot)) else { continue };
+            let view = SettledView {
+                correction: member.correction,
+                block: joint.covariance().block(index, index),
+                folded_noise: member.folded_noise,
+                nominal: member.nominal,
+                form: self.config.form,
+            };
+            points.push(SettledPoint { time: key.time, boot: member.boot, view });
+        }
+        points
+    }
+}
+
+impl SettledPoint {
+    /// The estimate and its covariance (position in the map, yaw) at `state` of the nominal trajectory,
+    /// until the next fact.
+    pub fn estimate(&self, state: &NominalState) -> (Pose2, Symmetric3) {
+        let view = &self.view;
+        extrapolate(view.form, &view.correction, &view.nominal, view.folded_noise, &view.block, state)
+    }
+}

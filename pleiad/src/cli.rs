@@ -1,0 +1,250 @@
+//! The command line, as clap sees it.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use pleiad_estimation::{LandmarkId, RobotId};
+
+/// A team of robots localized as one distributed Kalman filter over a message bus.
+#[derive(Debug, Parser)]
+#[command(name = "pleiad", version, after_help = "Logs go to stderr; PLEIAD_LOG=info shows more.")]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The observability demonstration: the same team without and with one GPS receiver.
+    Demo(DemoArgs),
+    /// Run a scenario: simulated robots, one agent process each.
+    Run(RunArgs),
+    /// Replay a recording through the agents of a team.
+    Replay(ReplayArgs),
+    /// What a scenario or a recording lets the team know of itself.
+    Observability(ObservabilityArgs),
+    /// One robot's agent.
+    Agent(AgentArgs),
+    /// Launch and watch the agents of a configuration.
+    Coordinator(CoordinatorArgs),
+    /// Feed samples into running agents through their sensor keys.
+    #[command(name = "sim-peers")]
+    SimPeers(SimPeersArgs),
+    /// Shell completions.
+    Completions {
+        /// For which shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Number of robots.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(2..=50))]
+    pub robots: u32,
+    /// Length of the run in simulated seconds, at least 120.
+    #[arg(long, default_value_t = 300.0)]
+    pub seconds: f64,
+    /// Simulated seconds per second; as fast as the agents can if absent.
+    #[arg(long)]
+    pub speed: Option<f64>,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for the report and all data; a new one under runs/ if absent.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// One JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// The scenario; docs/scenario.md lists its keys.
+    pub scenario: PathBuf,
+    /// Seed; the scenario's own if absent.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Simulated seconds per second; as fast as the agents can if absent.
+    #[arg(long)]
+    pub speed: Option<f64>,
+    /// How the robots share what they see.
+    #[arg(long, value_enum, default_value_t = StrategyArg::Exact)]
+    pub strategy: StrategyArg,
+    /// Coordinates of the filter's error.
+    #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
+    pub error: ErrorArg,
+    /// Restart an agent that ends by itself.
+    #[arg(long)]
+    pub restart: bool,
+    /// Folder for the report and all data; a new one under runs/ if absent.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// One JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// A recording folder, a run folder, or an MRCLAM folder.
+    pub recording: PathBuf,
+    /// How the robots share what they see.
+    #[arg(long, value_enum, default_value_t = StrategyArg::Exact)]
+    pub strategy: StrategyArg,
+    /// Coordinates of the filter's error.
+    #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
+    pub error: ErrorArg,
+    /// Which landmarks the robots know: known, none, or numbers as in 6,7.
+    #[arg(long, default_value = "known")]
+    pub landmarks: LandmarksArg,
+    /// Position fixes made from ground truth, as in 1@1.0:0.3 (robot 1, 1 Hz, sigma 0.3 m). Repeatable.
+    #[arg(long, value_name = "ROBOT@HZ:SIGMA_M")]
+    pub absolute: Vec<AbsoluteArg>,
+    /// Begin this many seconds into the time that all robots cover.
+    #[arg(long, default_value_t = 0.0)]
+    pub start: f64,
+    /// Length in seconds; to the end if absent.
+    #[arg(long)]
+    pub seconds: Option<f64>,
+    /// One agent process per robot over zenoh, instead of all in one process.
+    #[arg(long)]
+    pub processes: bool,
+    /// Seed of position fixes made from ground truth.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Noise and geometry of the robots: a file with the sections [filter], [motion] and [sensors] of an
+    /// agent's configuration. Default: noise.toml in the recording, or what is built in for its form.
+    #[arg(long)]
+    pub noise: Option<PathBuf>,
+    /// Leave out rows that cannot be read; they are counted and reported.
+    #[arg(long)]
+    pub skip_bad_rows: bool,
+    /// Folder for the report and all data; a new one under runs/ if absent.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// One JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ObservabilityArgs {
+    /// A scenario (a TOML file) or a recording (a folder).
+    pub input: PathBuf,
+    /// Seed of a scenario; its own if absent.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Which landmarks of a recording are known: known, none, or numbers as in 6,7.
+    #[arg(long, default_value = "known")]
+    pub landmarks: LandmarksArg,
+    /// Only this many seconds from the start.
+    #[arg(long)]
+    pub seconds: Option<f64>,
+    /// One JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct AgentArgs {
+    /// The agent's configuration; docs/agent.md lists its keys.
+    #[arg(long)]
+    pub config: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct CoordinatorArgs {
+    /// The coordinator's configuration; docs/coordinator.md lists its keys.
+    #[arg(long)]
+    pub config: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct SimPeersArgs {
+    /// A scenario to simulate, or a recording folder to play.
+    pub input: PathBuf,
+    /// The team whose agents are fed.
+    #[arg(long)]
+    pub team: String,
+    /// Endpoints of the agents (or of a router).
+    #[arg(long, required = true)]
+    pub connect: Vec<String>,
+    /// Seed of a scenario; its own if absent.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Seconds of team time per second; as fast as the agents can if absent.
+    #[arg(long)]
+    pub speed: Option<f64>,
+    /// Print the team time reached, a line per second of it.
+    #[arg(long)]
+    pub progress: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StrategyArg {
+    /// The joint filter: every robot folds all facts.
+    Exact,
+    /// Observations of other robots are ignored.
+    Independent,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ErrorArg {
+    /// Right-invariant.
+    Invariant,
+    /// Additive: the textbook filter.
+    Additive,
+}
+
+/// `known`, `none`, or a list of numbers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LandmarksArg {
+    Known,
+    None,
+    Only(Vec<LandmarkId>),
+}
+
+impl FromStr for LandmarksArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "known" => Ok(Self::Known),
+            "none" => Ok(Self::None),
+            list => list
+                .split(',')
+                .map(|id| id.trim().parse().map(LandmarkId))
+                .collect::<Result<_, _>>()
+                .map(Self::Only)
+                .map_err(|_| format!("found {text:?}, expected known, none, or numbers as in 6,7")),
+        }
+    }
+}
+
+/// `ROBOT@HZ:SIGMA_M`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AbsoluteArg {
+    pub robot: RobotId,
+    pub rate_hz: f64,
+    pub sigma_m: f64,
+}
+
+impl FromStr for AbsoluteArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts =
+            text.split_once('@').and_then(|(robot, rest)| rest.split_once(':').map(|(hz, m)| (robot, hz, m)));
+        let parsed = parts.and_then(|(robot, hz, sigma)| {
+            Some(Self {
+                robot: RobotId(robot.parse().ok()?),
+                rate_hz: hz.parse().ok().filter(|hz: &f64| hz.is_finite() && *hz > 0.0)?,
+                sigma_m: sigma.parse().ok().filter(|sigma: &f64| sigma.is_finite() && *sigma > 0.0)?,
+            })
+        });
+        parsed.ok_or_else(|| format!("found {text:?}, expected ROBOT@HZ:SIGMA_M as in 1@1.0:0.3"))
+    }
+}

@@ -1,0 +1,62 @@
+//! `pleiad agent`: one robot's agent, until told to shut down.
+
+use std::sync::Arc;
+
+use anyhow::Context;
+use pleiad_agent::AgentConfig;
+use pleiad_agent::config::BusMode;
+use pleiad_bus::{Bus, ZenohBus, ZenohConfig, ZenohMode};
+
+use crate::cli::AgentArgs;
+
+/// Runs an agent from its configuration file.
+pub fn run(args: &AgentArgs) -> anyhow::Result<()> {
+    let config = AgentConfig::read(&args.config)?;
+    runtime()?.block_on(async {
+        let bus = Arc::new(ZenohBus::open(&zenoh_config(&config)).await?);
+        // Every start of the process is told apart from every other by a number nobody can guess.
+        let nonce = getrandom::u64().context("the system gives no random number")?;
+        let outcome = pleiad_agent::driver::run(&config, &bus, nonce, stopped()).await;
+        bus.close().await;
+        Ok(outcome?)
+    })
+}
+
+/// The runtime that zenoh needs: several threads.
+pub fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .context("cannot start the asynchronous runtime")
+}
+
+fn zenoh_config(config: &AgentConfig) -> ZenohConfig {
+    ZenohConfig {
+        mode: match config.bus.mode {
+            BusMode::Peer => ZenohMode::Peer,
+            BusMode::Client => ZenohMode::Client,
+        },
+        listen: config.bus.listen.clone(),
+        connect: config.bus.connect.clone(),
+        multicast: config.bus.multicast,
+    }
+}
+
+/// Ends at Ctrl-C or SIGTERM.
+pub async fn stopped() {
+    let interrupt = tokio::signal::ctrl_c();
+    let mut terminate = match tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate()) {
+        Ok(terminate) => terminate,
+        Err(error) => {
+            tracing::warn!(%error, "SIGTERM cannot be caught: results will not be written on it");
+            // A signal that cannot be awaited leaves the other one.
+            let _ = interrupt.await;
+            return;
+        }
+    };
+    tokio::select! {
+        _ = interrupt => {}
+        _ = terminate.recv() => {}
+    }
+}

@@ -1,0 +1,27 @@
+//! The subcommands.
+
+mod agent;
+mod coordinator;
+mod demo;
+mod observability;
+mod replay;
+mod run;
+mod runner;
+mod shells;
+mod sim_peers;
+
+use crate::cli::Command;
+
+/// Runs a subcommand to its end.
+pub fn run(command: Command) -> anyhow::Result<()> {
+    match command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Run(args) => run::run(&args),
+        Command::Replay(args) => replay::run(&args),
+        Command::Observability(args) => observability::run(&args),
+        Command::Agent(args) => agent::run(&args),
+        Command::Coordinator(args) => coordinator::run(&args),
+        Command::SimPeers(args) => sim_peers::run(&args),
+        Command::Completions { shell } => shells::completions(shell),
+    }
+}

@@ -1,0 +1,263 @@
+//! `pleiad replay`: a recording through the agents of a team.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Context;
+use pleiad_agent::SettledEstimate;
+use pleiad_estimation::Timestamp;
+use pleiad_recording::{IngestReport, ReadOptions, Recording, tum};
+use pleiad_report::{ReplayReport, RobotScore, replay_report, write_summary};
+use serde::Serialize;
+
+use super::runner::{self, Feeder, ProcessOptions};
+use crate::cli::ReplayArgs;
+use crate::evaluation::{self, NisJson, RunResult};
+use crate::setup::{self, FilterArgs, ReplayOptions, Team};
+use crate::{folder, output, payload};
+
+/// `replay --json` and `summary.json`.
+#[derive(Debug, Serialize)]
+pub struct ReplayJson {
+    pub recording: String,
+    pub command: String,
+    pub out: String,
+    pub robots: Vec<RobotJson>,
+    pub mean_position_rmse_m: Option<f64>,
+    pub dead_reckoning_mean_rmse_m: Option<f64>,
+    pub online_mean_position_rmse_m: Option<f64>,
+    pub facts: FactsJson,
+    pub payload_bytes: PayloadJson,
+    pub nis: NisJson,
+    pub seconds: SecondsJson,
+    pub processes: usize,
+    pub notes: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ingest: Option<IngestReport>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct RobotJson {
+    pub robot: u32,
+    pub position_rmse_m: Option<f64>,
+    pub heading_rmse_rad: Option<f64>,
+    pub distance_m: f64,
+    pub dead_reckoning_rmse_m: Option<f64>,
+    pub online_position_rmse_m: Option<f64>,
+    pub estimate: String,
+}
+
+#[derive(Debug, Serialize)]
+pub struct FactsJson {
+    pub relative: usize,
+    pub absolute: usize,
+    pub used: usize,
+    pub rejected: usize,
+    pub skipped: usize,
+    pub pending: usize,
+    pub void: usize,
+}
+
+#[derive(Debug, Serialize)]
+pub struct PayloadJson {
+    pub per_relative_observation: f64,
+    pub total: u64,
+}
+
+#[derive(Debug, Serialize)]
+pub struct SecondsJson {
+    pub recorded: f64,
+    pub wall: f64,
+}
+
+pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
+    let (recording, ingest) =
+        pleiad_recording::open(&args.recording, &ReadOptions { skip_bad_rows: args.skip_bad_rows })?;
+    let options = ReplayOptions {
+        filter: FilterArgs { strategy: args.strategy, error: args.error },
+        landmarks: &args.landmarks,
+        absolute: &args.absolute,
+        start_s: args.start,
+        seconds: args.seconds,
+        seed: args.seed,
+        noise: args.noise.as_deref(),
+        folder: &args.recording,
+        mrclam: ingest.form == pleiad_recording::Form::Mrclam,
+    };
+    let team = setup::recorded(&recording, &options)?;
+    let out = folder::create(args.out.as_deref(), &format!("replay-{}", recording.name))?;
+    let result = if args.processes {
+        let options =
+            ProcessOptions { feeder: Feeder::Samples, speed: None, restart: false, label: "replaying" };
+        runner::as_processes(&team, &out, &options)?
+    } else {
+        runner::in_process(&team, "replaying")?
+    };
+    let command = command_line();
+    let json = write_run(&team, &result, &out, &command, Some(ingest))?;
+    output::print(args.json, &json, &text(&json))
+}
+
+/// The command as it was given, for a report to repeat.
+pub fn command_line() -> String {
+    let words = std::env::args().skip(1).map(|word| {
+        let plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./:@=,".contains(c));
+        if plain && !word.is_empty() { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
+    });
+    std::iter::once("pleiad".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// Writes trajectories, summary and report, and gives the summary.
+pub fn write_run(
+    team: &Team,
+    result: &RunResult,
+    out: &Path,
+    command: &str,
+    ingest: Option<IngestReport>,
+) -> anyhow::Result<ReplayJson> {
+    let (first, last) = team.span().context("there is not a single sample")?;
+    write_trajectories(result, out)?;
+    let scores: Vec<RobotScore> =
+        result.robots.iter().map(|(robot, own)| evaluation::score(*robot, own, &team.recording)).collect();
+    let json = summary(&team.recording, result, &scores, (first, last), out, command, ingest);
+    write_summary(&out.join("summary.json"), &json)?;
+    let (nis, facts) = evaluation::by_kind(&result.ledger, first);
+    let mut highlights = vec![
+        (
+            "payload of a relative observation".to_owned(),
+            format!("{:.0} bytes", json.payload_bytes.per_relative_observation),
+        ),
+        ("all published bytes".to_owned(), json.payload_bytes.total.to_string()),
+        (
+            "wall-clock time".to_owned(),
+            format!("{:.2} s for {:.0} s", json.seconds.wall, json.seconds.recorded),
+        ),
+    ];
+    if result.processes > 0 {
+        highlights.push(("agent processes".to_owned(), result.processes.to_string()));
+    }
+    let report = ReplayReport {
+        name: team.recording.name.clone(),
+        seconds: last.seconds_since(first),
+        series: evaluation::series(result, &team.recording, first),
+        landmarks: evaluation::landmarks(&team.recording),
+        scores,
+        nis,
+        facts,
+        highlights,
+        notes: result.notes.clone(),
+        commands: vec![("this report".to_owned(), command.to_owned())],
+    };
+    replay_report(&report)?.write(&out.join("report.html"))?;
+    Ok(json)
+}
+
+fn summary(
+    recording: &Recording,
+    result: &RunResult,
+    scores: &[RobotScore],
+    (first, last): (Timestamp, Timestamp),
+    out: &Path,
+    command: &str,
+    ingest: Option<IngestReport>,
+) -> ReplayJson {
+    let counts = result.ledger.counts();
+    let robots = scores.iter().map(|score| RobotJson {
+        robot: score.robot.0,
+        position_rmse_m: score.settled.map(|accuracy| accuracy.position_rmse_m),
+        heading_rmse_rad: score.settled.map(|accuracy| accuracy.heading_rmse_rad),
+        distance_m: score.distance_m,
+        dead_reckoning_rmse_m: score.dead_reckoning.map(|accuracy| accuracy.position_rmse_m),
+        online_position_rmse_m: score.online.map(|accuracy| accuracy.position_rmse_m),
+        estimate: result.robots.get(&score.robot).map(|own| own.summary.estimate.clone()).unwrap_or_default(),
+    });
+    ReplayJson {
+        recording: recording.name.clone(),
+        command: command.to_owned(),
+        out: out.display().to_string(),
+        robots: robots.collect(),
+        mean_position_rmse_m: evaluation::mean_position_rmse_m(scores.iter(), |score| score.settled),
+        dead_reckoning_mean_rmse_m: evaluation::mean_position_rmse_m(scores.iter(), |score| {
+            score.dead_reckoning
+        }),
+        online_mean_position_rmse_m: evaluation::mean_position_rmse_m(scores.iter(), |score| score.online),
+        facts: FactsJson {
+            relative: counts.relative,
+            absolute: counts.absolute,
+            used: counts.used,
+            rejected: counts.rejected,
+            skipped: counts.skipped,
+            pending: counts.pending,
+            void: counts.void,
+        },
+        payload_bytes: PayloadJson {
+            per_relative_observation: payload::per_relative_observation(result.entries()),
+            total: result.robots.values().map(|own| own.summary.bytes).sum(),
+        },
+        nis: evaluation::nis(&result.ledger),
+        seconds: SecondsJson { recorded: last.seconds_since(first), wall: result.wall_s },
+        processes: result.processes,
+        notes: result.notes.clone(),
+        ingest,
+    }
+}
+
+fn write_trajectories(result: &RunResult, out: &Path) -> anyhow::Result<()> {
+    for (robot, own) in &result.robots {
+        let write = |view: &str, estimates: &[SettledEstimate]| {
+            let path = out.join(view).join(format!("robot-{robot}.tum"));
+            let poses: Vec<_> = estimates.iter().map(|estimate| (estimate.time, estimate.pose)).collect();
+            tum::write(&path, &poses)
+        };
+        write("settled", &own.settled)?;
+        write("online", &own.online)?;
+    }
+    Ok(())
+}
+
+/// The summary for people.
+pub fn text(json: &ReplayJson) -> String {
+    let metres = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
+    let mut text =
+        format!("{}: {:.1} s in {:.1} s\n\n", json.recording, json.seconds.recorded, json.seconds.wall);
+    let _ = writeln!(text, "robot  position RMSE m  heading RMSE rad  dead reckoning m  distance m");
+    for robot in &json.robots {
+        let _ = writeln!(
+            text,
+            "{:>5}  {:>15}  {:>16}  {:>16}  {:>10.1}",
+            robot.robot,
+            metres(robot.position_rmse_m),
+            metres(robot.heading_rmse_rad),
+            metres(robot.dead_reckoning_rmse_m),
+            robot.distance_m
+        );
+    }
+    let _ = writeln!(
+        text,
+        " mean  {:>15}  {:>16}  {:>16}\n",
+        metres(json.mean_position_rmse_m),
+        "",
+        metres(json.dead_reckoning_mean_rmse_m)
+    );
+    let facts = &json.facts;
+    let _ = writeln!(
+        text,
+        "facts: {} relative, {} absolute; {} used, {} rejected, {} skipped, {} pending, {} void",
+        facts.relative, facts.absolute, facts.used, facts.rejected, facts.skipped, facts.pending, facts.void
+    );
+    let _ = writeln!(
+        text,
+        "NIS per degree of freedom {:.2}, {:.1} % within the 95 % bound; {:.0} bytes per relative observation",
+        json.nis.mean,
+        100.0 * json.nis.within_95,
+        json.payload_bytes.per_relative_observation
+    );
+    for note in &json.notes {
+        let _ = writeln!(text, "note: {note}");
+    }
+    if let Some(ingest) = json.ingest.as_ref().filter(|ingest| !ingest.is_clean()) {
+        let _ = writeln!(text, "{ingest}");
+    }
+    let _ = writeln!(text, "report: {}/report.html", json.out);
+    text
+}

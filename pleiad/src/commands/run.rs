@@ -1,0 +1,37 @@
+//! `pleiad run`: a scenario with one agent process per robot, fed by a process that simulates the robots.
+
+use anyhow::bail;
+use pleiad_sim_peers::{Scenario, simulate};
+
+use super::replay::{command_line, text, write_run};
+use super::runner::{self, Feeder, ProcessOptions};
+use crate::cli::RunArgs;
+use crate::setup::{self, FilterArgs};
+use crate::{folder, output};
+
+pub fn run(args: &RunArgs) -> anyhow::Result<()> {
+    if let Some(speed) = args.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
+        bail!("--speed {speed}: expected a positive number");
+    }
+    let scenario = Scenario::load(&args.scenario)?;
+    let seed = args.seed.unwrap_or(scenario.seed);
+    let world = simulate(&scenario, seed)?;
+    let filter = FilterArgs { strategy: args.strategy, error: args.error };
+    let team = setup::simulated(&scenario, world, filter);
+    let out = folder::create(args.out.as_deref(), &scenario.name)?;
+    std::fs::copy(&args.scenario, out.join("scenario.toml"))?;
+    let options = ProcessOptions {
+        feeder: Feeder::Scenario { path: &args.scenario, seed },
+        speed: args.speed,
+        restart: args.restart,
+        label: &scenario.name,
+    };
+    let result = runner::as_processes(&team, &out, &options)?;
+    // Beside the samples stands what a replay has to know of each robot.
+    for (robot, settings) in &scenario.robots {
+        let path = out.join("recording").join(format!("noise-r{robot}.toml"));
+        std::fs::write(&path, toml::to_string(&setup::noise_of(settings))?)?;
+    }
+    let json = write_run(&team, &result, &out, &command_line(), None)?;
+    output::print(args.json, &json, &text(&json))
+}

@@ -1,0 +1,278 @@
+//! A team run to its end: in this process under virtual time, or as agent processes.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use pleiad_agent::config::{AgentConfig, BusSection};
+use pleiad_agent::journal::Journal;
+use pleiad_agent::results::{self, AgentSummary};
+use pleiad_agent::{Record, driver};
+use pleiad_bus::{Bus, ZenohBus};
+use pleiad_coordinator::{AgentEntry, CoordinatorConfig, Restart, Team as Agents, endpoints};
+use pleiad_estimation::ledger::Ledger;
+use pleiad_estimation::sample::Sample;
+use pleiad_estimation::{RobotId, Timestamp};
+use pleiad_recording::{Overwrite, Recording, RobotRecording, write_folder};
+use pleiad_sim_peers::{Fleet, FleetOptions};
+use tokio::io::{AsyncBufReadExt, BufReader};
+
+use super::agent::runtime;
+use crate::evaluation::{RobotResult, RunResult};
+use crate::setup::Team;
+use crate::{folder, output};
+
+/// Digest rounds granted after the last sample; without faults one is enough.
+const SETTLING_ROUNDS: u32 = 50;
+/// Limits for a machine that is very busy; a run that goes well never comes near them.
+const ALIVE_WITHIN: Duration = Duration::from_mins(1);
+const SETTLED_WITHIN: Duration = Duration::from_mins(1);
+const ENDED_WITHIN: Duration = Duration::from_secs(30);
+
+/// Runs all nodes in this process.
+pub fn in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
+    let configs = team.agents.values().map(AgentConfig::node).collect::<Result<_, _>>()?;
+    let (first, last) = team.span().context("there is not a single sample to run on")?;
+    let began = Instant::now();
+    let mut fleet = Fleet::new(configs, &FleetOptions::default())?;
+    let bar = output::progress(label, last.seconds_since(first));
+    fleet.feed(&team.samples, |now| {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds of a run")]
+        bar.set_position(now.seconds_since(first).max(0.0) as u64);
+    });
+    let agreed = fleet.settle(last, SETTLING_ROUNDS);
+    bar.finish_and_clear();
+    let mut notes = team.notes.clone();
+    if !agreed {
+        notes.push(
+            "the robots did not agree at the end: some observations stayed without their other half"
+                .to_owned(),
+        );
+    }
+    let mut robots = BTreeMap::new();
+    let mut ledger = None;
+    for (robot, mut outcome) in fleet.into_outcomes() {
+        for notice in &outcome.notices {
+            notes.push(format!("robot {robot}: {notice}"));
+        }
+        let summary = results::summary(&mut outcome.node, outcome.messages, outcome.bytes);
+        let result = RobotResult { settled: outcome.node.settled(), online: outcome.online, summary };
+        ledger.get_or_insert_with(|| outcome.node.ledger().clone());
+        robots.insert(robot, result);
+    }
+    let ledger = ledger.context("the team has no robot")?;
+    Ok(RunResult { robots, ledger, notes, wall_s: began.elapsed().as_secs_f64(), processes: 0 })
+}
+
+/// Where the process that feeds the agents gets its samples from.
+pub enum Feeder<'a> {
+    /// A scenario, simulated anew by that process.
+    Scenario {
+        /// The file.
+        path: &'a Path,
+        /// The seed.
+        seed: u64,
+    },
+    /// The samples of the team, written as a recording first.
+    Samples,
+}
+
+/// How agent processes are run.
+pub struct ProcessOptions<'a> {
+    /// Where the samples come from.
+    pub feeder: Feeder<'a>,
+    /// Seconds of team time per second; `None` as fast as the agents can.
+    pub speed: Option<f64>,
+    /// Whether an agent that ends by itself is restarted.
+    pub restart: bool,
+    /// For the progress bar.
+    pub label: &'a str,
+}
+
+/// Runs one agent process per robot over zenoh on loopback, fed by one more process.
+pub fn as_processes(team: &Team, out: &Path, options: &ProcessOptions) -> anyhow::Result<RunResult> {
+    let began = Instant::now();
+    let robots: Vec<RobotId> = team.agents.keys().copied().collect();
+    let endpoints = endpoints(&robots)?;
+    // A name of its own, so that runs on one machine do not hear one another.
+    let name = format!("run-{:016x}", getrandom::u64().context("the system gives no random number")?);
+    let mut entries = Vec::new();
+    for (robot, agent) in &team.agents {
+        let mut agent = agent.clone();
+        let endpoint = endpoints.get(robot).context("an endpoint for every robot")?;
+        agent.team.clone_from(&name);
+        agent.bus = BusSection {
+            listen: vec![endpoint.listen.clone()],
+            connect: endpoint.connect.clone(),
+            ..agent.bus
+        };
+        let folder = folder::agent(out, *robot);
+        std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        agent.output.directory = Some(folder.clone());
+        let path = folder.join("agent.toml");
+        let text = toml::to_string(&agent).context("writing an agent's configuration")?;
+        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        entries.push(AgentEntry { robot: robot.0, config: path, log: Some(folder.join("agent.log")) });
+    }
+    let input = feeder_input(team, out, &options.feeder)?;
+    let connect: Vec<String> = endpoints.values().map(|endpoint| endpoint.listen.clone()).collect();
+    let config = CoordinatorConfig {
+        team: name.clone(),
+        executable: Some(executable()?),
+        restart: if options.restart { Restart::OnFailure } else { Restart::Never },
+        detached: false,
+        status_period_s: 0.1,
+        shutdown_timeout_s: ENDED_WITHIN.as_secs_f64(),
+        record: None,
+        backoff: pleiad_coordinator::Backoff::default(),
+        bus: pleiad_coordinator::BusSection { connect: connect.clone(), ..Default::default() },
+        agents: entries,
+    };
+    let span = team.span().context("there is not a single sample to run on")?;
+    runtime()?.block_on(async {
+        let bus = Arc::new(ZenohBus::open(&config.bus.zenoh()).await?);
+        let outcome = conduct(&config, &bus, &input, options, &connect, span).await;
+        bus.close().await;
+        outcome
+    })?;
+    collect(team, out, began)
+}
+
+fn executable() -> anyhow::Result<PathBuf> {
+    std::env::current_exe().context("cannot find this program's own file, which the agents run")
+}
+
+/// What the feeding process is told to read.
+fn feeder_input(team: &Team, out: &Path, feeder: &Feeder) -> anyhow::Result<Vec<String>> {
+    Ok(match feeder {
+        Feeder::Scenario { path, seed } => {
+            vec![path.display().to_string(), "--seed".to_owned(), seed.to_string()]
+        }
+        Feeder::Samples => {
+            let folder = out.join("fed");
+            write_folder(&with_samples(&team.recording, &team.samples), &folder, Overwrite::Refuse)?;
+            vec![folder.display().to_string()]
+        }
+    })
+}
+
+/// The recording with these samples in place of its own; truth, commands and map stay.
+fn with_samples(recording: &Recording, samples: &BTreeMap<RobotId, Vec<Sample>>) -> Recording {
+    let mut replaced = recording.clone();
+    replaced.robots.retain(|robot, _| samples.get(robot).is_some_and(|samples| !samples.is_empty()));
+    for (robot, channels) in &mut replaced.robots {
+        let commands = std::mem::take(&mut channels.commands);
+        let truth = std::mem::take(&mut channels.truth);
+        *channels = RobotRecording { commands, truth, ..RobotRecording::default() };
+        for sample in samples.get(robot).into_iter().flatten() {
+            channels.push(*sample);
+        }
+    }
+    replaced
+}
+
+/// From launch to the last agent's end.
+async fn conduct(
+    config: &CoordinatorConfig,
+    bus: &Arc<ZenohBus>,
+    input: &[String],
+    options: &ProcessOptions<'_>,
+    connect: &[String],
+    span: (Timestamp, Timestamp),
+) -> anyhow::Result<()> {
+    let agents = Agents::launch(config, bus.clone()).await?;
+    agents.wait_until_alive(ALIVE_WITHIN).await?;
+    feed(config, input, options, connect, span).await?;
+    let settled = agents.wait_until_settled(&std::collections::BTreeSet::new(), SETTLED_WITHIN).await;
+    let ended = agents.shutdown(ENDED_WITHIN).await;
+    settled?;
+    ended?;
+    Ok(())
+}
+
+async fn feed(
+    config: &CoordinatorConfig,
+    input: &[String],
+    options: &ProcessOptions<'_>,
+    connect: &[String],
+    (first, last): (Timestamp, Timestamp),
+) -> anyhow::Result<()> {
+    let mut command = tokio::process::Command::new(executable()?);
+    command.arg("sim-peers").args(input).args(["--team", &config.team, "--progress"]);
+    for endpoint in connect {
+        command.args(["--connect", endpoint]);
+    }
+    if let Some(speed) = options.speed {
+        command.args(["--speed", &speed.to_string()]);
+    }
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).kill_on_drop(true);
+    let mut child = command.spawn().context("cannot start the process that feeds the agents")?;
+    let bar = output::progress(options.label, last.seconds_since(first));
+    if let Some(stdout) = child.stdout.take() {
+        let mut lines = BufReader::new(stdout).lines();
+        while let Some(line) = lines.next_line().await? {
+            if let Ok(second) = line.parse::<f64>() {
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "seconds of a run"
+                )]
+                bar.set_position((second - first.seconds()).max(0.0) as u64);
+            }
+        }
+    }
+    let status = child.wait().await?;
+    bar.finish_and_clear();
+    if !status.success() {
+        bail!("the process that feeds the agents ended with {status}; what it said is above");
+    }
+    Ok(())
+}
+
+/// What the agents left in their folders.
+fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult> {
+    let wall_s = began.elapsed().as_secs_f64();
+    let mut robots = BTreeMap::new();
+    let mut ledger: Option<Ledger> = None;
+    let mut notes = team.notes.clone();
+    let mut received = BTreeMap::new();
+    for (robot, agent) in &team.agents {
+        let folder = folder::agent(out, *robot);
+        let records = Journal::read(&folder.join(driver::JOURNAL))?;
+        let mut own = Ledger::new(agent.node()?.fold);
+        let mut samples = Vec::new();
+        for record in records {
+            match record {
+                Record::Entry(entry) => {
+                    own.insert(entry);
+                }
+                Record::Sample(sample) => samples.push(sample),
+            }
+        }
+        samples.sort_by_key(|sample| sample.time);
+        received.insert(*robot, samples);
+        let summary: AgentSummary = results::read_summary(&folder)?;
+        // An independent fold of what the agent wrote down must give the bits it announced.
+        let folded = own.fingerprint().to_string();
+        if folded != summary.estimate {
+            bail!(
+                "robot {robot}: the agent ended with estimate {}, its journal folds to {folded}",
+                summary.estimate
+            );
+        }
+        for (reason, count) in &summary.samples_refused {
+            notes.push(format!("robot {robot}: {count} samples refused ({reason})"));
+        }
+        let settled = results::read_estimates(&folder.join(results::SETTLED))?;
+        let online = results::read_estimates(&folder.join(results::ONLINE))?;
+        ledger.get_or_insert(own);
+        robots.insert(*robot, RobotResult { settled, online, summary });
+    }
+    write_folder(&with_samples(&team.recording, &received), &out.join("recording"), Overwrite::Refuse)?;
+    let processes = robots.len();
+    let ledger = ledger.context("the team has no robot")?;
+    Ok(RunResult { robots, ledger, notes, wall_s, processes })
+}

@@ -1,0 +1,42 @@
+//! What people and scripts see: text or one JSON object on stdout, everything else on stderr.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+/// Prints lines for people, or the object for scripts.
+#[allow(clippy::print_stdout, reason = "the one place that writes to stdout")]
+pub fn print(json: bool, object: &impl Serialize, text: &str) -> anyhow::Result<()> {
+    if json {
+        println!("{}", serde_json::to_string_pretty(object)?);
+    } else {
+        println!("{}", text.trim_end());
+    }
+    Ok(())
+}
+
+/// Prints text as it is.
+#[allow(clippy::print_stdout, reason = "the one place that writes to stdout")]
+pub fn raw(text: &str) {
+    print!("{text}");
+}
+
+/// The error and what led to it, a line each.
+#[allow(clippy::print_stderr, reason = "the one place that reports a failure")]
+pub fn error(error: &anyhow::Error) {
+    eprintln!("error: {error}");
+    for cause in error.chain().skip(1) {
+        eprintln!("  because: {cause}");
+    }
+}
+
+/// A bar over team time in seconds on stderr; nothing where stderr is no terminal.
+pub fn progress(label: &str, seconds: f64) -> ProgressBar {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds of a run")]
+    let bar = ProgressBar::new(seconds.max(0.0) as u64);
+    let style = ProgressStyle::with_template("{msg:32} {bar:40} {pos:>5}/{len} s  {elapsed}");
+    if let Ok(style) = style {
+        bar.set_style(style);
+    }
+    bar.set_message(label.to_owned());
+    bar
+}

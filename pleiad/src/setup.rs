@@ -1,0 +1,360 @@
+//! From a scenario or a recording to the configurations of a team's agents and the samples they get.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use pleiad_agent::config::{
+    AgentConfig, AngleNoise, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LengthNoise,
+    MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection, Strategy,
+};
+use pleiad_estimation::sample::{Reading, Sample};
+use pleiad_estimation::{RobotId, Timestamp};
+use pleiad_recording::{Recording, RobotRecording};
+use pleiad_sim_peers::scenario::{RelativeKind, RobotSettings};
+use pleiad_sim_peers::{Scenario, SimulatedRun};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use crate::cli::{AbsoluteArg, ErrorArg, LandmarksArg, StrategyArg};
+
+/// Truth is interpolated across holes up to this long.
+pub const TRUTH_GAP_S: f64 = 0.3;
+/// What a robot is told of its start when a recording with ground truth is replayed.
+const START_SIGMA_M: f64 = 0.02;
+const START_SIGMA_RAD: f64 = 0.02;
+
+const MRCLAM_NOISE: &str = include_str!("../noise/mrclam.toml");
+
+/// The part of an agent's configuration that describes the robot rather than the run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct NoiseFile {
+    /// As in an agent's configuration.
+    pub filter: FilterSection,
+    /// As in an agent's configuration.
+    pub motion: MotionSection,
+    /// As in an agent's configuration.
+    pub sensors: SensorsSection,
+}
+
+/// A team ready to run.
+pub struct Team {
+    /// Configuration per robot, without network and disk.
+    pub agents: BTreeMap<RobotId, AgentConfig>,
+    /// What each robot is fed.
+    pub samples: BTreeMap<RobotId, Vec<Sample>>,
+    /// What the run is judged by, and where its data came from.
+    pub recording: Recording,
+    /// Remarks, for people.
+    pub notes: Vec<String>,
+}
+
+impl Team {
+    /// First and last sample.
+    pub fn span(&self) -> Option<(Timestamp, Timestamp)> {
+        let times = self.samples.values().flatten().map(|sample| sample.time);
+        times.clone().min().zip(times.max())
+    }
+}
+
+/// How the filter is to be run, from the command line.
+#[derive(Clone, Copy, Debug)]
+pub struct FilterArgs {
+    pub strategy: StrategyArg,
+    pub error: ErrorArg,
+}
+
+impl FilterArgs {
+    fn strategy(self) -> Strategy {
+        match self.strategy {
+            StrategyArg::Exact => Strategy::Exact,
+            StrategyArg::Independent => Strategy::Independent,
+        }
+    }
+
+    fn apply(self, filter: &FilterSection) -> FilterSection {
+        let error = match self.error {
+            ErrorArg::Invariant => ErrorName::Invariant,
+            ErrorArg::Additive => ErrorName::Additive,
+        };
+        FilterSection { error, gate: filter.gate }
+    }
+}
+
+fn configuration(
+    robot: RobotId,
+    noise: &NoiseFile,
+    filter: FilterArgs,
+    landmarks: &[LandmarkRow],
+) -> AgentConfig {
+    AgentConfig {
+        team: "pleiad".to_owned(),
+        robot: robot.0,
+        strategy: filter.strategy(),
+        filter: filter.apply(&noise.filter),
+        prior: None,
+        motion: noise.motion.clone(),
+        sensors: noise.sensors.clone(),
+        clock: ClockSection::default(),
+        landmarks: landmarks.to_vec(),
+        bus: BusSection::default(),
+        output: OutputSection::default(),
+    }
+}
+
+fn map(recording: &Recording) -> Vec<LandmarkRow> {
+    let rows = recording.landmarks.iter();
+    rows.map(|(id, [x_m, y_m])| LandmarkRow { id: id.0, x_m: *x_m, y_m: *y_m }).collect()
+}
+
+/// A simulated team, told what the scenario tells it.
+pub fn simulated(scenario: &Scenario, run: SimulatedRun, filter: FilterArgs) -> Team {
+    let landmarks = map(&run.recording);
+    let mut agents = BTreeMap::new();
+    for (robot, settings) in &scenario.robots {
+        let mut agent = configuration(*robot, &noise_of(settings), filter, &landmarks);
+        agent.prior = run.priors.get(robot).map(|prior| PriorSection {
+            x_m: prior.pose.x_m(),
+            y_m: prior.pose.y_m(),
+            heading_rad: prior.pose.yaw_rad(),
+            sigma_position_m: prior.sigma_position_m,
+            sigma_heading_rad: prior.sigma_heading_rad,
+            for_boot: 0,
+        });
+        agents.insert(*robot, agent);
+    }
+    let samples = run.recording.robots.iter().map(|(robot, channels)| (*robot, channels.samples())).collect();
+    Team { agents, samples, recording: run.recording, notes: Vec::new() }
+}
+
+/// What a simulated robot's agent has to know: the noises the world was made with.
+pub fn noise_of(settings: &RobotSettings) -> NoiseFile {
+    let noise = &settings.odometry.noise;
+    let motion = MotionSection {
+        wheel_radius_m: Some(settings.wheel_radius_m),
+        track_width_m: Some(settings.track_width_m),
+        forward_m_per_sqrt_s: noise.speed_m_per_sqrt_s,
+        lateral_m_per_sqrt_s: noise.lateral_m_per_sqrt_s,
+        yaw_rad_per_sqrt_s: noise.yaw_rad_per_sqrt_s,
+        forward_m_per_sqrt_m: noise.speed_m_per_sqrt_m,
+        yaw_rad_per_sqrt_rad: noise.yaw_rad_per_sqrt_rad,
+        quiet_at_standstill: noise.quiet_at_standstill,
+        speed_limit_m_s: settings.motion.speed_m_s.max(0.1),
+        yaw_rate_limit_rad_s: settings.motion.max_yaw_rate_rad_s.max(0.1),
+        ..MotionSection::default()
+    };
+    let mut sensors = SensorsSection::default();
+    let relative = &settings.relative;
+    if relative.rate_hz > 0.0 {
+        match relative.kind {
+            RelativeKind::Pose => {
+                sensors.relative_pose = Some(PoseNoise {
+                    sigma_position_m: relative.sigma_position_m,
+                    sigma_yaw_rad: relative.sigma_yaw_rad,
+                });
+                // Of a landmark the same sensor gives a position.
+                sensors.relative_position = Some(LengthNoise { sigma_m: relative.sigma_position_m });
+            }
+            RelativeKind::Position => {
+                sensors.relative_position = Some(LengthNoise { sigma_m: relative.sigma_position_m });
+            }
+            RelativeKind::Range => sensors.range = Some(LengthNoise { sigma_m: relative.sigma_range_m }),
+            RelativeKind::Bearing => {
+                sensors.bearing = Some(AngleNoise { sigma_rad: relative.sigma_bearing_rad });
+            }
+            RelativeKind::RangeBearing => {
+                sensors.range_bearing = Some(RangeBearingNoise {
+                    sigma_range_m: relative.sigma_range_m,
+                    sigma_bearing_rad: relative.sigma_bearing_rad,
+                });
+            }
+        }
+    }
+    if settings.gps.rate_hz > 0.0 {
+        sensors.gps = Some(LengthNoise { sigma_m: settings.gps.sigma_m });
+    }
+    if settings.heading.rate_hz > 0.0 {
+        sensors.heading = Some(AngleNoise { sigma_rad: settings.heading.sigma_rad });
+    }
+    NoiseFile { filter: FilterSection::default(), motion, sensors }
+}
+
+/// How a recording is to be replayed.
+pub struct ReplayOptions<'a> {
+    pub filter: FilterArgs,
+    pub landmarks: &'a LandmarksArg,
+    pub absolute: &'a [AbsoluteArg],
+    pub start_s: f64,
+    pub seconds: Option<f64>,
+    pub seed: u64,
+    pub noise: Option<&'a Path>,
+    /// The folder the recording came from, which may hold a `noise.toml`.
+    pub folder: &'a Path,
+    pub mrclam: bool,
+}
+
+/// A recorded team, started where the ground truth says.
+pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Result<Team> {
+    let (first, last) = recording.common_time().context(
+        "the robots' odometry and ground truth have no time in common; a replay starts from ground truth",
+    )?;
+    if !(options.start_s.is_finite() && options.start_s >= 0.0) {
+        bail!("--start {}: expected zero or a positive number of seconds", options.start_s);
+    }
+    let start = first.plus_seconds(options.start_s);
+    let end = match options.seconds {
+        Some(seconds) if seconds.is_finite() && seconds > 0.0 => start.plus_seconds(seconds).min(last),
+        Some(seconds) => bail!("--seconds {seconds}: expected a positive number"),
+        None => last,
+    };
+    if start >= end {
+        let length = last.seconds_since(first);
+        bail!("--start {}: the robots' common time is only {length:.1} s long", options.start_s);
+    }
+    let mut recording = recording.slice(start, end);
+    recording = match options.landmarks {
+        LandmarksArg::Known => recording,
+        LandmarksArg::None => recording.with_landmarks(&BTreeSet::new()),
+        LandmarksArg::Only(ids) => {
+            if let Some(unknown) = ids.iter().find(|id| !recording.landmarks.contains_key(id)) {
+                let known: Vec<_> = recording.landmarks.keys().map(ToString::to_string).collect();
+                bail!("--landmarks: {unknown} is not in the map, which has {}", known.join(", "));
+            }
+            recording.with_landmarks(&ids.iter().copied().collect())
+        }
+    };
+    let mut notes = Vec::new();
+    add_fixes(&mut recording, options, (start, end))?;
+    let landmarks = map(&recording);
+    let mut agents = BTreeMap::new();
+    let mut samples = BTreeMap::new();
+    for (robot, channels) in &recording.robots {
+        let noise = noise_for(*robot, &recording, options)?;
+        let mut agent = configuration(*robot, &noise, options.filter, &landmarks);
+        let mut fed = channels.samples();
+        let placed = prior(channels);
+        if let Some((time, prior)) = placed {
+            let before = fed.len();
+            fed.retain(|sample| sample.time >= time);
+            if fed.len() < before {
+                let count = before - fed.len();
+                notes.push(format!(
+                    "robot {robot}: {count} samples before the first with ground truth left out"
+                ));
+            }
+            agent.prior = Some(prior);
+        } else {
+            notes.push(format!("robot {robot}: no ground truth at any odometry, so no place in the map"));
+        }
+        for fix in options.absolute.iter().filter(|fix| fix.robot == *robot) {
+            agent.sensors.gps = Some(LengthNoise { sigma_m: fix.sigma_m });
+        }
+        agents.insert(*robot, agent);
+        samples.insert(*robot, fed);
+    }
+    Ok(Team { agents, samples, recording, notes })
+}
+
+/// The true pose at the first odometry that has one.
+fn prior(channels: &RobotRecording) -> Option<(Timestamp, PriorSection)> {
+    channels.odometry.iter().find_map(|sample| {
+        let pose = channels.truth_at(sample.time, TRUTH_GAP_S)?;
+        let prior = PriorSection {
+            x_m: pose.x_m(),
+            y_m: pose.y_m(),
+            heading_rad: pose.yaw_rad(),
+            sigma_position_m: START_SIGMA_M,
+            sigma_heading_rad: START_SIGMA_RAD,
+            for_boot: 0,
+        };
+        Some((sample.time, prior))
+    })
+}
+
+/// Position fixes from ground truth and seeded noise; they replace what the robot recorded.
+fn add_fixes(
+    recording: &mut Recording,
+    options: &ReplayOptions,
+    (start, end): (Timestamp, Timestamp),
+) -> anyhow::Result<()> {
+    for fix in options.absolute {
+        let Some(channels) = recording.robots.get_mut(&fix.robot) else {
+            bail!("--absolute: the recording has no robot {}", fix.robot);
+        };
+        let mut random = rand_chacha::ChaCha12Rng::seed_from_u64(options.seed);
+        random.set_stream(u64::from(fix.robot.0));
+        let mut fixes = Vec::new();
+        for count in 1.. {
+            let time = start.plus_seconds(f64::from(count) / fix.rate_hz);
+            if time > end {
+                break;
+            }
+            let [dx, dy]: [f64; 2] = std::array::from_fn(|_| StandardNormal.sample(&mut random));
+            if let Some(pose) = channels.truth_at(time, TRUTH_GAP_S) {
+                let reading =
+                    Reading::Gps { x_m: pose.x_m() + fix.sigma_m * dx, y_m: pose.y_m() + fix.sigma_m * dy };
+                fixes.push(Sample { time, reading });
+            }
+        }
+        channels.gps = fixes;
+    }
+    Ok(())
+}
+
+fn noise_for(robot: RobotId, recording: &Recording, options: &ReplayOptions) -> anyhow::Result<NoiseFile> {
+    let beside = options.folder.join("noise.toml");
+    let own = options.folder.join(format!("noise-r{robot}.toml"));
+    let path = match options.noise {
+        Some(path) => Some(path),
+        None if own.is_file() => Some(own.as_path()),
+        None if beside.is_file() => Some(beside.as_path()),
+        None => None,
+    };
+    if let Some(path) = path {
+        let text =
+            std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        return toml::from_str(&text).with_context(|| format!("{}", path.display()));
+    }
+    if options.mrclam {
+        return toml::from_str(MRCLAM_NOISE).context("the built-in noise of MRCLAM");
+    }
+    let Some(nominal) = &recording.nominal else {
+        bail!(
+            "the recording says nothing about its noise: write noise.toml into it with the sections [motion] \
+             and [sensors] of docs/agent.md, or name such a file with --noise"
+        );
+    };
+    let noise = &nominal.noise;
+    let (wheel_radius_m, track_width_m) = match nominal.robots.get(&robot) {
+        Some(own) => (Some(own.wheel_radius), Some(own.track_width)),
+        None => (None, None),
+    };
+    let positive = |sigma_m: f64| (sigma_m > 0.0).then_some(LengthNoise { sigma_m });
+    Ok(NoiseFile {
+        filter: FilterSection::default(),
+        motion: MotionSection {
+            wheel_radius_m,
+            track_width_m,
+            // The declared floors of rolling contact over one second, with room for what they leave out.
+            forward_m_per_sqrt_s: (3.0 * noise.odometry_floor_pos_sigma_m_per_1s).max(1e-3),
+            lateral_m_per_sqrt_s: (3.0 * noise.odometry_floor_pos_sigma_m_per_1s).max(1e-3),
+            yaw_rad_per_sqrt_s: (3.0 * noise.odometry_floor_heading_sigma_rad_per_1s).max(1e-3),
+            ..MotionSection::default()
+        },
+        sensors: SensorsSection {
+            range_bearing: (noise.range_sigma_m > 0.0 && noise.bearing_sigma_rad > 0.0).then_some(
+                RangeBearingNoise {
+                    sigma_range_m: noise.range_sigma_m,
+                    sigma_bearing_rad: noise.bearing_sigma_rad,
+                },
+            ),
+            range_bias_m: nominal.robots.get(&robot).map_or(0.0, |own| own.range_bias_m),
+            gps: positive(noise.gps_sigma_m),
+            heading: (noise.heading_sigma_rad > 0.0)
+                .then_some(AngleNoise { sigma_rad: noise.heading_sigma_rad }),
+            ..SensorsSection::default()
+        },
+    })
+}
