@@ -32,8 +32,16 @@ pub enum ConfigError {
         /// Line, column and what was expected there.
         cause: Box<toml::de::Error>,
     },
+    /// A value of a file out of its range.
+    #[error("{path}: {cause}")]
+    In {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong in it.
+        cause: Box<ConfigError>,
+    },
     /// A value out of its range.
-    #[error("{key} = {found}: {expected}")]
+    #[error("{key} = {found}: expected {expected}")]
     Value {
         /// The key, with its table.
         key: String,
@@ -415,8 +423,10 @@ impl AgentConfig {
             .map_err(|cause| ConfigError::Read { path: path.to_owned(), cause })?;
         let config: Self = toml::from_str(&text)
             .map_err(|cause| ConfigError::Parse { path: path.to_owned(), cause: Box::new(cause) })?;
-        config.node()?;
-        Ok(config)
+        match config.node() {
+            Ok(_) => Ok(config),
+            Err(cause) => Err(ConfigError::In { path: path.to_owned(), cause: Box::new(cause) }),
+        }
     }
 
     /// The team's name.
@@ -605,14 +615,23 @@ impl SensorsSection {
 
     fn check(&self) -> Result<(), ConfigError> {
         finite("sensors.range_bias_m", self.range_bias_m)?;
-        for (index, noise) in self.profiles().iter().enumerate() {
-            let Some(noise) = noise else { continue };
-            for variance in
-                [noise.lower[0], noise.lower[2], noise.lower[5]].iter().take(usize::from(noise.dimension))
-            {
-                #[allow(clippy::cast_possible_truncation, reason = "seven profiles")]
-                let name = Self::profile_name(index as u16);
-                positive(&format!("sensors.{name}"), variance.sqrt())?;
+        let length = |noise: &Option<LengthNoise>| noise.as_ref().map(|noise| noise.sigma_m);
+        let angle = |noise: &Option<AngleNoise>| noise.as_ref().map(|noise| noise.sigma_rad);
+        let (pose, polar) = (self.relative_pose.as_ref(), self.range_bearing.as_ref());
+        let sigmas = [
+            ("relative_pose.sigma_position_m", pose.map(|noise| noise.sigma_position_m)),
+            ("relative_pose.sigma_yaw_rad", pose.map(|noise| noise.sigma_yaw_rad)),
+            ("relative_position.sigma_m", length(&self.relative_position)),
+            ("range.sigma_m", length(&self.range)),
+            ("bearing.sigma_rad", angle(&self.bearing)),
+            ("range_bearing.sigma_range_m", polar.map(|noise| noise.sigma_range_m)),
+            ("range_bearing.sigma_bearing_rad", polar.map(|noise| noise.sigma_bearing_rad)),
+            ("gps.sigma_m", length(&self.gps)),
+            ("heading.sigma_rad", angle(&self.heading)),
+        ];
+        for (key, sigma) in sigmas {
+            if let Some(sigma) = sigma {
+                positive(&format!("sensors.{key}"), sigma)?;
             }
         }
         Ok(())

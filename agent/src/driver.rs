@@ -24,12 +24,12 @@ use crate::journal::{Journal, JournalError};
 use crate::node::{Command, Event, Node, Notice, Record, SettledEstimate};
 use crate::results::{self, ResultsError};
 
-/// A peer that does not answer a request for facts is asked again at its next status.
+/// How long a peer has to answer. For facts it is asked again at its next status.
 const ASK_TIMEOUT: Duration = Duration::from_secs(2);
-/// How long, and how often within it, an agent without a journal asks whether the team knows a former
-/// life of its robot.
-const REJOIN_TRIES: u32 = 5;
-const REJOIN_TIMEOUT: Duration = Duration::from_millis(200);
+/// How long an agent without a journal looks for a first peer that may know a former life of its robot, and
+/// then for the next one.
+const REJOIN_LIMIT: Duration = Duration::from_secs(1);
+const REJOIN_NEXT: Duration = Duration::from_millis(200);
 
 /// Why an agent ended.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +67,8 @@ struct Agent<'a, B: Bus> {
     bus: &'a B,
     team: TeamName,
     online: Vec<SettledEstimate>,
-    last_ack: Option<SensorAck>,
+    /// The last batch and its acknowledgement: a batch sent again is answered again, and taken once.
+    last_batch: Option<(Vec<u8>, SensorAck)>,
     /// Peers with an unanswered request.
     asked: BTreeSet<RobotId>,
     answers: mpsc::Sender<(RobotId, Option<Vec<Entry>>)>,
@@ -112,7 +113,7 @@ pub async fn run<B: Bus + Clone>(
         bus,
         team,
         online: Vec::new(),
-        last_ack: None,
+        last_batch: None,
         asked: BTreeSet::new(),
         answers: answers_in,
         misattributed: 0,
@@ -164,19 +165,23 @@ impl<B: Bus + Clone> Agent<'_, B> {
     /// peers already hold would contradict them, so whoever is there is asked first.
     async fn ask_for_former_life(&mut self) -> Result<(), DriverError> {
         let question = Message::ControlRequest(ControlRequest::Status).encode();
-        let key = keys::all(&self.team, Kind::Control);
-        for _ in 0..REJOIN_TRIES {
-            let asked = tokio::time::Instant::now();
-            if let Ok(reply) = self.bus.request(&key, question.clone(), REJOIN_TIMEOUT).await {
-                if let Ok(Message::ControlReply(ControlReply::Status(status))) = Message::decode(&reply) {
-                    self.act(Event::Status(status)).await?;
-                }
+        let mut present = self.bus.watch(&keys::all(&self.team, Kind::Alive)).await?;
+        let limit = tokio::time::Instant::now() + REJOIN_LIMIT;
+        let mut answered = false;
+        loop {
+            // Links may still be coming up, so that nobody there yet is not nobody there.
+            let patience = if answered { tokio::time::Instant::now() + REJOIN_NEXT } else { limit };
+            let Ok(Some(peer)) = tokio::time::timeout_at(patience.min(limit), present.recv()).await else {
                 return Ok(());
+            };
+            let Some(robot) = self.sender(&peer.key).filter(|_| peer.alive) else { continue };
+            let key = keys::of(&self.team, robot, Kind::Control);
+            let Ok(reply) = self.bus.request(&key, question.clone(), ASK_TIMEOUT).await else { continue };
+            if let Ok(Message::ControlReply(ControlReply::Status(status))) = Message::decode(&reply) {
+                answered = true;
+                self.act(Event::Status(status)).await?;
             }
-            // Nobody there is said at once; links may still be coming up.
-            tokio::time::sleep_until(asked + REJOIN_TIMEOUT).await;
         }
-        Ok(())
     }
 
     async fn serve(
@@ -355,11 +360,14 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 return Ok(());
             }
         };
-        let ack = match &self.last_ack {
-            Some(ack) if ack.number == batch.number && batch.number != 0 => ack.clone(),
-            _ => self.take_batch(batch).await?,
+        let ack = match &self.last_batch {
+            Some((last, ack)) if *last == query.payload => ack.clone(),
+            _ => {
+                let ack = self.take_batch(batch).await?;
+                self.last_batch = Some((query.payload.clone(), ack.clone()));
+                ack
+            }
         };
-        self.last_ack = Some(ack.clone());
         self.publisher.reply(query, &Message::SensorAck(ack));
         Ok(())
     }
@@ -368,20 +376,25 @@ impl<B: Bus + Clone> Agent<'_, B> {
         let mut ack = SensorAck { number: batch.number, ..SensorAck::default() };
         let (mut records, mut entries, mut rest) = (Vec::new(), Vec::new(), Vec::new());
         for sample in batch.samples {
-            let mut refused = false;
+            // A sample that is taken is always journalled; one that is not never is.
+            let mut taken = false;
             for command in self.node.handle(Event::Sample(sample)) {
                 match command {
-                    Command::Journal(more) => records.extend(more),
-                    Command::Publish(more) => entries.extend(more),
-                    Command::Notice(Notice::SampleRefused(refusal)) => {
-                        refused = true;
-                        ack.first_refusal.get_or_insert_with(|| refusal.to_string());
-                        rest.push(Command::Notice(Notice::SampleRefused(refusal)));
+                    Command::Journal(more) => {
+                        taken |= more.iter().any(|record| matches!(record, Record::Sample(_)));
+                        records.extend(more);
                     }
+                    Command::Publish(more) => entries.extend(more),
                     other => rest.push(other),
                 }
             }
-            if refused { ack.refused += 1 } else { ack.accepted += 1 }
+            if taken {
+                ack.accepted += 1;
+            } else {
+                ack.refused += 1;
+                let reason = || self.node.last_refusal().map(|refusal| refusal.to_string());
+                ack.first_refusal = ack.first_refusal.or_else(reason);
+            }
         }
         if batch.end {
             rest.extend(self.node.handle(Event::InputEnded));

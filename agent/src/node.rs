@@ -7,7 +7,7 @@ mod recovery;
 mod segments;
 mod views;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 pub use commands::{Command, Event, Notice, Record};
 pub use intake::SampleRefusal;
@@ -17,7 +17,7 @@ use pleiad_estimation::fact::{
     Absolute, Answer, Body, Boot, Continuation, Entry, EntryId, Half, LogId, NoiseRef, Observation, Profile,
     Quantity, VoidReason,
 };
-use pleiad_estimation::ledger::{Insertion, Ledger};
+use pleiad_estimation::ledger::{Insertion, Ledger, Refusal};
 use pleiad_estimation::motion::DeadReckoning;
 use pleiad_estimation::nominal::Outside;
 use pleiad_estimation::sample::Sample;
@@ -52,6 +52,8 @@ pub struct Node {
     input_ended: bool,
     /// The highest boot of this robot that anyone is known to hold a log of.
     known_boot: Option<BootIndex>,
+    /// Logs written under another configuration: known not to be of use, and not asked for.
+    foreign: BTreeSet<LogId>,
     /// Filled while an event is handled.
     out: Outbox,
 }
@@ -79,6 +81,7 @@ impl Node {
             counts: intake::Counts::default(),
             input_ended: false,
             known_boot: None,
+            foreign: BTreeSet::new(),
             out: Outbox::default(),
         }
     }
@@ -135,9 +138,10 @@ impl Node {
         let mut added = false;
         for entry in entries {
             let id = entry.id;
-            if id.robot == self.config.robot && !self.take_own(id) {
+            if self.foreign.contains(&id.log()) || (id.robot == self.config.robot && !self.take_own(id)) {
                 continue;
             }
+            let trusted = !self.ledger.quarantined().contains(&id.robot);
             match self.ledger.insert(entry.clone()) {
                 Insertion::Added { .. } => {
                     added = true;
@@ -148,8 +152,20 @@ impl Node {
                     self.ask_for_gap(id);
                 }
                 Insertion::Duplicate => {}
-                Insertion::Refused(refusal) => self.notice(Notice::EntryRefused { id, refusal }),
-                Insertion::Equivocation => self.notice(Notice::Equivocation { id }),
+                Insertion::Refused(refusal) => {
+                    if refusal == Refusal::Configuration {
+                        self.foreign.insert(id.log());
+                    }
+                    self.notice(Notice::EntryRefused { id, refusal });
+                }
+                Insertion::Equivocation => {
+                    // A contradiction is knowledge too: after a restart it must lead to the same ledger.
+                    let counts = self.ledger.entries(id.log(), id.sequence.0).first() == Some(&entry);
+                    if trusted || counts {
+                        self.out.records.push(Record::Entry(entry));
+                    }
+                    self.notice(Notice::Equivocation { id });
+                }
             }
         }
         if added {
@@ -188,16 +204,22 @@ impl Node {
         let held: BTreeMap<LogId, _> = self.ledger.digests().map(|digest| (digest.log, digest)).collect();
         let mut ranges = Vec::new();
         for theirs in &status.logs {
-            if theirs.log.robot == self.config.robot {
-                self.known_boot = self.known_boot.max(Some(theirs.log.boot));
-                if self.boot == Some(theirs.log.boot) {
-                    continue;
-                }
+            let LogId { robot, boot } = theirs.log;
+            let own = robot == self.config.robot;
+            if own {
+                self.known_boot = self.known_boot.max(Some(boot));
             }
             let ours = held.get(&theirs.log);
             let from = ours.map_or(0, |ours| ours.held);
             if theirs.held > from {
-                ranges.push(LogRange { log: theirs.log, from, to: theirs.held });
+                let useless =
+                    self.foreign.contains(&theirs.log) || self.ledger.quarantined().contains(&robot);
+                if own && self.boot == Some(boot) {
+                    let id = EntryId { robot, boot, sequence: Sequence(theirs.held - 1) };
+                    self.notice(Notice::OwnLogAhead { id });
+                } else if !useless {
+                    ranges.push(LogRange { log: theirs.log, from, to: theirs.held });
+                }
             } else if ours.is_some_and(|ours| ours.held == theirs.held && ours.chain != theirs.chain) {
                 self.notice(Notice::Fork { log: theirs.log, peer: status.robot });
             }
@@ -210,7 +232,7 @@ impl Node {
     fn end_input(&mut self) {
         self.input_ended = true;
         for sample in std::mem::take(&mut self.waiting) {
-            self.counts.refuse(&SampleRefusal::AfterLastOdometry { time: sample.time });
+            self.refuse_waiting(SampleRefusal::AfterLastOdometry { time: sample.time });
         }
         self.answer();
     }

@@ -66,22 +66,19 @@ pub enum SampleRefusal {
 }
 
 /// How many samples were taken, left out on purpose, and refused for which reason.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Counts {
     pub accepted: u64,
     pub refused: u64,
     pub reasons: BTreeMap<String, u64>,
+    pub last: Option<SampleRefusal>,
 }
 
 impl Counts {
     /// Counts a refusal; `true` for the first of its kind, which is worth a notice.
     pub(super) fn refuse(&mut self, refusal: &SampleRefusal) -> bool {
-        self.accepted = self.accepted.saturating_sub(u64::from(matches!(
-            refusal,
-            // It had been accepted to wait.
-            SampleRefusal::AfterLastOdometry { .. }
-        )));
         self.refused += 1;
+        self.last = Some(*refusal);
         let debug = format!("{refusal:?}");
         let kind = debug.split([' ', '(', '{']).next().unwrap_or_default();
         let count = self.reasons.entry(kind.to_owned()).or_insert(0);
@@ -107,12 +104,20 @@ impl Node {
                 // After the entries it led to: a boot's entries stand before the sample that began it.
                 self.out.records.push(Record::Sample(sample));
             }
-            Err(refusal) => {
-                if self.counts.refuse(&refusal) {
-                    self.notice(Notice::SampleRefused(refusal));
-                }
-            }
+            Err(refusal) => self.refuse(refusal),
         }
+    }
+
+    fn refuse(&mut self, refusal: SampleRefusal) {
+        if self.counts.refuse(&refusal) {
+            self.notice(Notice::SampleRefused(refusal));
+        }
+    }
+
+    /// Refuses an observation that had been accepted to wait for odometry.
+    pub(super) fn refuse_waiting(&mut self, refusal: SampleRefusal) {
+        self.counts.accepted = self.counts.accepted.saturating_sub(1);
+        self.refuse(refusal);
     }
 
     fn take(&mut self, sample: Sample) -> Result<(), SampleRefusal> {
@@ -171,10 +176,7 @@ impl Node {
         while self.waiting.front().is_some_and(|first| first.time <= sample.time) {
             let Some(observation) = self.waiting.pop_front() else { break };
             if let Err(refusal) = self.observe(&observation) {
-                self.counts.accepted = self.counts.accepted.saturating_sub(1);
-                if self.counts.refuse(&refusal) {
-                    self.notice(Notice::SampleRefused(refusal));
-                }
+                self.refuse_waiting(refusal);
             }
         }
         self.answer();

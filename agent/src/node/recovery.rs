@@ -1,6 +1,7 @@
 //! A node from the journal of its former life.
 
-use pleiad_estimation::fact::Body;
+use pleiad_estimation::BootIndex;
+use pleiad_estimation::fact::{Body, Boot};
 use pleiad_estimation::sample::Reading;
 
 use super::{Node, Record};
@@ -13,16 +14,15 @@ impl Node {
     pub fn recover(config: NodeConfig, nonce: u64, records: impl IntoIterator<Item = Record>) -> Self {
         let mut node = Self::new(config, nonce);
         // A boot's entries stand before the sample that began it; that sample starts dead reckoning anew.
-        let mut boot_begins = false;
+        // A boot without its sample was lived without this journal and came back from a peer.
+        let mut announced: Option<(BootIndex, Boot)> = None;
         for record in records {
             match record {
                 Record::Entry(entry) => {
                     if entry.id.robot == node.config.robot {
                         node.known_boot = node.known_boot.max(Some(entry.id.boot));
                         if let Body::Boot(boot) = &entry.body {
-                            boot_begins = true;
-                            let horizon = node.config.history_samples;
-                            node.segments.begin(entry.id.boot, boot.time, boot.nominal, horizon);
+                            announced = Some((entry.id.boot, *boot));
                         }
                     }
                     node.ledger.insert(entry);
@@ -30,7 +30,9 @@ impl Node {
                 Record::Sample(sample) => match sample.reading {
                     Reading::Gyro { yaw_rate_rad_s } => node.dead_reckoning.gyro(sample.time, yaw_rate_rad_s),
                     Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_) => {
-                        if std::mem::take(&mut boot_begins) {
+                        if let Some((index, boot)) = announced.take_if(|(_, boot)| boot.time == sample.time) {
+                            let horizon = node.config.history_samples;
+                            node.segments.begin(index, boot.time, boot.nominal, horizon);
                             node.dead_reckoning.restart(sample);
                         } else if let Ok(Some(step)) = node.dead_reckoning.odometry(sample) {
                             node.segments.extend(&step);

@@ -7,7 +7,7 @@ use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, Pose2};
 use pleiad_protocol::{Estimate, LogStatus, SampleCounts, Status};
 
-use super::Node;
+use super::{Node, SampleRefusal};
 
 /// One point of a settled trajectory: the estimate at a time on all facts up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,6 +114,11 @@ impl Node {
     /// Why samples were refused, and how often.
     pub fn refusals(&self) -> impl Iterator<Item = (&str, u64)> {
         self.counts.reasons.iter().map(|(reason, count)| (reason.as_str(), *count))
+    }
+
+    /// Why the sample refused last was refused. Notices are given for the first of a reason only.
+    pub fn last_refusal(&self) -> Option<SampleRefusal> {
+        self.counts.last
     }
 
     /// Distance travelled by dead reckoning, m.
