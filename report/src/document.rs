@@ -160,19 +160,9 @@ impl Document {
     }
 
     fn foot(&self) -> String {
-<<<<<<< HEAD
-        let commands: String = self
-            .commands
-            .iter()
-            .map(|(what, command)| {
-                format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command))
-            })
-            .collect();
-=======
         let commands = each(&self.commands, |(what, command)| {
             format!("<p>{}</p>\n<pre><code>{}</code></pre>\n", prose(what), escape(command))
         });
->>>>>>> report
         let heading = if commands.is_empty() { "" } else { "<h2>Reproduce</h2>\n" };
         format!(
             "<footer>\n{heading}{commands}<p class=\"fine\">Made by Pleiad. This file is complete in itself and fetches \
@@ -195,18 +185,9 @@ impl Block {
                 format!("<p class=\"verdict {class}\"><b>{word}</b> {}</p>\n", prose(text))
             }
             Self::Facts(facts) => {
-<<<<<<< HEAD
-                let items: String = facts
-                    .iter()
-                    .map(|(key, value)| {
-                        format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value))
-                    })
-                    .collect();
-=======
                 let items = each(facts, |(key, value)| {
                     format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(key), prose(value))
                 });
->>>>>>> report
                 format!("<dl>\n{items}</dl>\n")
             }
             Self::Section(heading) => format!("<h2>{}</h2>\n", escape(heading)),
@@ -234,30 +215,11 @@ fn each<T>(items: &[T], html: impl Fn(&T) -> String) -> String {
 
 fn render_figure(panels: &[Panel], caption: &str, numbers: &mut Numbers) -> String {
     let number = numbers.figures;
-<<<<<<< HEAD
-    let mut html =
-        format!("<figure id=\"figure-{number}\">\n<div class=\"panels panels-{}\">\n", panels.len().min(3));
-    for panel in panels {
-        numbers.plots += 1;
-        let plot = numbers.plots;
-        let heading = if panel.heading.is_empty() {
-            String::new()
-        } else {
-            format!("<h3>{}</h3>", escape(&panel.heading))
-        };
-        html += &format!(
-            "<div class=\"panel\">{heading}<div class=\"plot\" id=\"plot-{plot}\" role=\"img\" aria-label=\"{}\"></div>\
-             <script type=\"application/json\">{}</script></div>\n",
-            escape(caption),
-            json_for_script(&panel.figure.to_json())
-        );
-=======
     let spoken = escape(caption);
     let mut drawn = String::new();
     for panel in panels {
         numbers.plots += 1;
         drawn += &render_panel(panel, numbers.plots, &spoken);
->>>>>>> report
     }
     let any = |thinning| panels.iter().any(|panel| panel.figure.has(thinning));
     let thinned = if any(Thinning::ToExtremes) {
@@ -265,12 +227,6 @@ fn render_figure(panels: &[Panel], caption: &str, numbers: &mut Numbers) -> Stri
     } else {
         String::new()
     };
-<<<<<<< HEAD
-    html + &format!(
-        "</div>\n<figcaption><b>Figure {number}.</b> {}{thinned}</figcaption>\n</figure>\n",
-        prose(caption)
-    )
-=======
     let sampled = if any(Thinning::EvenSample) {
         format!(" Of very many points an even sample of {MAX_POINTS} is drawn.")
     } else {
@@ -296,7 +252,6 @@ fn render_panel(panel: &Panel, plot: usize, spoken: &str) -> String {
          <script type=\"application/json\">{}</script></div>\n",
         json_for_script(&panel.figure.to_json())
     )
->>>>>>> report
 }
 
 /// Writes beside `path` and renames, so that no half-written file is ever seen under its name.

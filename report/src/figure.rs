@@ -180,12 +180,8 @@ impl Figure {
         let row = trace.row.min(self.rows.len() - 1);
         json.insert("yaxis".into(), axis_name("y", row).into());
         if !json.contains_key("hoverinfo") {
-<<<<<<< HEAD
-            let name = json.get("name").and_then(Value::as_str).unwrap_or_default();
-=======
             let own = json.get("name").and_then(Value::as_str).unwrap_or_default();
             let name = trace.hover_name.as_deref().unwrap_or(own);
->>>>>>> report
             let hover =
                 format!("{}<br>{}<extra>{name}</extra>", self.x.hover("x"), self.rows[row].hover("y"));
             json.insert("hovertemplate".into(), hover.into());

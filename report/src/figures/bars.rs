@@ -35,12 +35,8 @@ mod tests {
     fn a_group_of_another_length_is_refused() {
         let categories = ["a".to_owned(), "b".to_owned()];
         let error =
-<<<<<<< HEAD
-            bar_figure("robot", &categories, Axis::new("RMSE", "m"), &[("online", vec![1.0])]).unwrap_err();
-=======
             bar_figure("robot", &categories, Axis::new("RMSE", "m"), &[("online", Colour::Ink, vec![1.0])])
                 .unwrap_err();
->>>>>>> report
         assert!(error.to_string().contains("1 values for 2 categories"), "{error}");
     }
 }

@@ -18,11 +18,7 @@ pub fn nis_figure(series: &NisSeries) -> Result<Figure, ReportError> {
     let mut figure = Figure::new(Axis::new("time", "s"), Axis::new("NIS", "-").logarithmic()).height(320);
     if !used.is_empty() {
         figure = figure
-<<<<<<< HEAD
-            .trace(Trace::markers("used", &used_t, &used, Colour::Series(0), "circle", 3.0).opacity(0.6));
-=======
             .trace(Trace::markers("used", &used_t, &used, Colour::Series(4), "circle", 3.0).opacity(0.8));
->>>>>>> report
     }
     if !rejected.is_empty() {
         figure = figure.trace(Trace::markers(

@@ -17,9 +17,6 @@ use crate::{Axis, Colour, Dash, Figure, ReportError, TeamSeries, Trace, quantity
 pub fn sigma_figure(cases: &[(&str, &TeamSeries)]) -> Result<Figure, ReportError> {
     let mut figure =
         Figure::new(Axis::new("time", "s"), Axis::new("position sigma", "m").from_zero()).height(460);
-<<<<<<< HEAD
-    for (case_index, (case, team)) in cases.iter().enumerate() {
-=======
     let robots: BTreeSet<_> =
         cases.iter().flat_map(|(_, team)| &team.robots).map(|robot| robot.robot).collect();
     let colours: Vec<_> = robots.into_iter().collect();
@@ -29,23 +26,10 @@ pub fn sigma_figure(cases: &[(&str, &TeamSeries)]) -> Result<Figure, ReportError
     let mut listed = BTreeSet::new();
     for index in order {
         let (case, team) = cases[index];
->>>>>>> report
         team.check()?;
         let mut ends = Vec::new();
         for robot in &team.robots {
             let sigma = robot.position_sigma_m();
-<<<<<<< HEAD
-            if let (Some(&time), Some(&last)) = (robot.time_s.last(), sigma.last()) {
-                ends.push((time, last));
-            }
-            let mut trace =
-                Trace::line(&robot_name(robot.robot), &robot.time_s, &sigma, Colour::Series(index))
-                    .dash(dash);
-            if cases.len() > 1 {
-                trace = trace.group(case).group_heading(case);
-            }
-            figure = figure.trace(trace);
-=======
             ends.extend(robot.time_s.last().copied().zip(sigma.last().copied()));
             let name = robot_name(robot.robot);
             let colour = Colour::Series(colours.iter().position(|&id| id == robot.robot).unwrap_or_default());
@@ -53,7 +37,6 @@ pub fn sigma_figure(cases: &[(&str, &TeamSeries)]) -> Result<Figure, ReportError
             let trace = Trace::line(&name, &robot.time_s, &sigma, colour).hover_name(&label);
             let trace = trace.dash(dash_of(index, cases.len())).group(&name);
             figure = figure.trace(if listed.insert(robot.robot) { trace } else { trace.unlisted() });
->>>>>>> report
         }
         if cases.len() > 1 && !ends.is_empty() {
             let mean_square = ends.iter().map(|(_, sigma)| sigma * sigma).sum::<f64>() / ends.len() as f64;

@@ -5,13 +5,9 @@ use pleiad_estimation::RobotId;
 use crate::figures::{bar_figure, error_figures, map_figure, nis_figure, share_within_bounds, sigma_figure};
 use crate::number::{count, duration};
 use crate::reports::{MAP_CAPTION, SIGMA_MEANING};
-<<<<<<< HEAD
-use crate::{Accuracy, Axis, Document, Landmark, NisSeries, Panel, ReportError, Table, TeamSeries, quantity};
-=======
 use crate::{
     Accuracy, Axis, Colour, Document, Landmark, NisSeries, Panel, ReportError, Table, TeamSeries, quantity,
 };
->>>>>>> report
 
 /// What a run or a replay showed.
 #[derive(Clone, Debug, PartialEq)]
