@@ -10,6 +10,9 @@ use tokio::task::JoinSet;
 
 use crate::CoordinatorError;
 
+/// What is expected where something is to be done.
+pub(crate) const DONE: &str = "that it will be done";
+
 /// Asks one agent.
 pub(crate) async fn ask<B: Bus>(
     bus: &B,
@@ -58,14 +61,14 @@ pub(crate) fn status(robot: RobotId, reply: ControlReply) -> Result<Status, Coor
 pub(crate) fn accepted(robot: RobotId, reply: &ControlReply) -> Result<(), CoordinatorError> {
     match reply {
         ControlReply::Accepted => Ok(()),
-        other => Err(unexpected(robot, &words(other), "that it will be done")),
+        other => Err(unexpected(robot, &words(other), DONE)),
     }
 }
 
 fn words(reply: &ControlReply) -> String {
     match reply {
         ControlReply::Status(_) => "a status".to_owned(),
-        ControlReply::Accepted => "that it will be done".to_owned(),
+        ControlReply::Accepted => DONE.to_owned(),
         ControlReply::Refused(why) => format!("that it will not: {why}"),
     }
 }

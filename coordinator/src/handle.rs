@@ -16,8 +16,8 @@ use crate::{CoordinatorError, control};
 
 /// How long a process may take to end after a signal.
 const GRACE: Duration = Duration::from_secs(5);
-/// How long a process whose agreement to end was not heard may take to end all the same.
-const LAST_WORDS: Duration = Duration::from_secs(1);
+/// An agent whose answer does not come is asked again after this.
+const PAUSE: Duration = Duration::from_millis(250);
 
 /// How a process came to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,24 +118,10 @@ impl<B: Bus + Clone> Handle<B> {
         if let Some(exit) = member.ended() {
             return Ok(Departure { how: How::Before, exit });
         }
-        if member.alive {
-            let deadline = Instant::now() + timeout;
-            let asked = control::ask(&self.bus, &self.team, robot, ControlRequest::Shutdown, timeout).await;
-            match asked.and_then(|reply| control::accepted(robot, &reply)) {
-                Ok(()) => {
-                    let left = deadline.saturating_duration_since(Instant::now());
-                    if let Some(exit) = self.ended(robot, left).await? {
-                        return Ok(Departure { how: How::Asked, exit });
-                    }
-                }
-                Err(error) => {
-                    // The answer can be lost while its sender ends.
-                    if let Some(exit) = self.ended(robot, LAST_WORDS).await? {
-                        return Ok(Departure { how: How::Asked, exit });
-                    }
-                    tracing::warn!(robot = robot.0, %error, "the agent did not agree to end");
-                }
-            }
+        if member.alive
+            && let Some(exit) = self.ask_to_end(robot, timeout).await?
+        {
+            return Ok(Departure { how: How::Asked, exit });
         }
         self.signal(robot, ProcessSignal::Terminate).await?;
         if let Some(exit) = self.ended(robot, GRACE).await? {
@@ -143,6 +129,58 @@ impl<B: Bus + Clone> Handle<B> {
         }
         self.signal(robot, ProcessSignal::Kill).await?;
         Ok(Departure { how: How::Killed, exit: self.killed(robot).await? })
+    }
+
+    /// Asks for the end of a process, and waits for it.
+    async fn ask_to_end(&self, robot: RobotId, timeout: Duration) -> Result<Option<Exit>, CoordinatorError> {
+        let deadline = Instant::now() + timeout;
+        let left = || deadline.saturating_duration_since(Instant::now());
+        while self.member(robot)?.alive && !left().is_zero() {
+            let asked = self.ask(robot, ControlRequest::Shutdown, left()).await;
+            match asked.and_then(|reply| control::accepted(robot, &reply)) {
+                Ok(()) => return self.ended(robot, left()).await,
+                // The question can be lost, and the answer too while its sender ends.
+                Err(CoordinatorError::Bus(_)) => {
+                    if let Some(exit) = self.ended(robot, PAUSE).await? {
+                        return Ok(Some(exit));
+                    }
+                }
+                Err(error) => {
+                    tracing::warn!(robot = robot.0, %error, "the agent did not agree to end");
+                    return Ok(None);
+                }
+            }
+        }
+        // It has left the bus.
+        self.ended(robot, left().min(GRACE)).await
+    }
+
+    /// Tells an agent that its input has ended, until it has heard it or has ended.
+    pub(crate) async fn finish(&self, robot: RobotId, timeout: Duration) -> Result<(), CoordinatorError> {
+        let deadline = Instant::now() + timeout;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let asked = self.ask(robot, ControlRequest::Finish, left).await;
+            match asked.and_then(|reply| control::accepted(robot, &reply)) {
+                // The question can be lost, or a link not be there yet.
+                Err(CoordinatorError::Bus(_)) if Instant::now() + PAUSE < deadline => {
+                    if let Some(exit) = self.ended(robot, PAUSE).await? {
+                        let found = format!("nothing and ended ({exit})");
+                        return Err(CoordinatorError::Reply { robot, found, expected: control::DONE });
+                    }
+                }
+                outcome => return outcome,
+            }
+        }
+    }
+
+    async fn ask(
+        &self,
+        robot: RobotId,
+        request: ControlRequest,
+        timeout: Duration,
+    ) -> Result<ControlReply, CoordinatorError> {
+        control::ask(&self.bus, &self.team, robot, request, timeout).await
     }
 
     /// Waits for the end of a killed process.

@@ -179,13 +179,14 @@ impl<B: Bus + Clone> Team<B> {
 
     /// Tells all agents that have not ended that their sensor input has, and to write their results.
     pub async fn finish(&self) -> BTreeMap<RobotId, Result<(), CoordinatorError>> {
-        let members = self.members();
-        let here = members.iter().filter(|(_, member)| member.ended().is_none()).map(|(robot, _)| *robot);
-        let replies = self.handle.ask_all(&here.collect(), ControlRequest::Finish, FINISH_TIMEOUT).await;
-        let done = |(robot, reply): (RobotId, Result<_, _>)| {
-            (robot, reply.and_then(|reply| control::accepted(robot, &reply)))
-        };
-        replies.into_iter().map(done).collect()
+        let mut finishes = JoinSet::new();
+        for (robot, member) in self.members() {
+            if member.ended().is_none() {
+                let handle = self.handle.clone();
+                finishes.spawn(async move { (robot, handle.finish(robot, FINISH_TIMEOUT).await) });
+            }
+        }
+        finishes.join_all().await.into_iter().collect()
     }
 
     /// Ends all agents: asks those that are up, waits, then sends SIGTERM, then SIGKILL, five seconds
