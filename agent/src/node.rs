@@ -234,6 +234,14 @@ impl Node {
         for sample in std::mem::take(&mut self.waiting) {
             self.refuse_waiting(SampleRefusal::AfterLastOdometry { time: sample.time });
         }
+        // Restarted after the last odometry there will be: nothing moves any more, so the last boot is
+        // carried on from its end, without a gap, to answer what is still asked.
+        if self.boot.is_none()
+            && self.ledger.unanswered(self.config.robot).next().is_some()
+            && let Some((_, trajectory)) = self.segments.last()
+        {
+            self.begin_boot(Timestamp(trajectory.end().0.0 + 1));
+        }
         self.answer();
     }
 

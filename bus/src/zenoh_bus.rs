@@ -217,6 +217,8 @@ async fn answer_query(
     mut closing: watch::Receiver<bool>,
 ) {
     let answer = tokio::select! {
+        // An answer given just before the bus is closed is still sent.
+        biased;
         answer = answer => answer,
         _ = closing.wait_for(|closing| *closing) => return,
     };

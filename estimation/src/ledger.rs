@@ -188,13 +188,12 @@ impl Ledger {
     fn equivocation(&mut self, other: &Entry, replaces: bool) {
         let robot = other.id.robot;
         if replaces {
+            // Nobody is quarantined while what is held already is filed again.
             let mut rebuilt = Self::new(self.config);
-            rebuilt.quarantined.clone_from(&self.quarantined);
-            rebuilt.quarantined.remove(&robot);
-            for entry in self.logs.values().flat_map(Log::entries) {
+            for entry in self.logs.values().flat_map(Log::all) {
                 rebuilt.insert(if entry.id == other.id { other.clone() } else { entry.clone() });
             }
-            rebuilt.quarantined.clone_from(&self.quarantined);
+            rebuilt.quarantined = std::mem::take(&mut self.quarantined);
             *self = rebuilt;
         }
         self.quarantined.insert(robot);

@@ -133,6 +133,7 @@ impl Node {
                 self.odometry(sample)
             }
             Reading::Gps { .. } | Reading::Heading { .. } | Reading::Sighting { .. } => {
+                let sample = without_bias(sample, self.config.sensors.range_bias_m);
                 check_reading(&sample)?;
                 let robot_seen = matches!(sample.reading, Reading::Sighting { target: Target::Robot(_), .. });
                 if robot_seen && self.config.strategy == Strategy::Independent {
@@ -211,7 +212,6 @@ impl Node {
             }
             Reading::Sighting { target, relative } => {
                 let profile = SensorsSection::relative_profile(&relative);
-                let relative = without_bias(relative, self.config.sensors.range_bias_m);
                 match target {
                     Target::Robot(robot) if robot == self.config.robot => Err(SampleRefusal::Itself(robot)),
                     Target::Robot(robot) => Ok((Quantity::Robot { robot, relative }, profile)),
@@ -234,14 +234,13 @@ impl Node {
 }
 
 /// A range as it would be without its known bias.
-fn without_bias(relative: Relative, bias_m: f64) -> Relative {
-    match relative {
-        Relative::Range { range_m } => Relative::Range { range_m: range_m - bias_m },
-        Relative::RangeBearing { range_m, bearing_rad } => {
-            Relative::RangeBearing { range_m: range_m - bias_m, bearing_rad }
-        }
-        other => other,
+fn without_bias(mut sample: Sample, bias_m: f64) -> Sample {
+    if let Reading::Sighting { relative, .. } = &mut sample.reading
+        && let Relative::Range { range_m } | Relative::RangeBearing { range_m, .. } = relative
+    {
+        *range_m -= bias_m;
     }
+    sample
 }
 
 /// Numbers finite, ranges positive.

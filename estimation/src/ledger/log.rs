@@ -44,6 +44,11 @@ impl Log {
         usize::try_from(from).ok().and_then(|from| self.entries.get(from..)).unwrap_or(&[])
     }
 
+    /// Everything held, what waits for a gap included.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().chain(self.waiting.values().map(|(entry, _)| entry))
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.entries.is_empty() && self.waiting.is_empty()
     }
