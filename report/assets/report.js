@@ -1,10 +1,20 @@
 "use strict";
 (() => {
   const root = document.documentElement;
+  const saveButton = (format, icon, filename) => ({
+    name: `save-${format}`, title: `Save as ${format.toUpperCase()}`, icon,
+    click: (graph) => Plotly.downloadImage(graph, { format, filename, scale: 2, width: graph._fullLayout.width, height: graph._fullLayout.height }),
+  });
+  // Made once per plot: Plotly compares configurations by identity of their functions and starts over where they
+  // differ, and two draws that differ in them would set each other off without end.
+  const configOf = (name) => ({
+    displaylogo: false, responsive: false, displayModeBar: "hover",
+    modeBarButtons: [["resetScale2d", saveButton("png", Plotly.Icons.camera, name), saveButton("svg", Plotly.Icons.disk, name)]],
+  });
   const plots = [...document.querySelectorAll(".plot")].map((element) => ({
     element,
     spec: JSON.parse(element.parentNode.querySelector("script").textContent),
-    name: element.closest("figure").id,
+    config: configOf(element.closest("figure").id),
   }));
   const FULL_PAGE_PX = 680; // A4 less its margins, at 96 px to the inch
   const touch = window.matchMedia("(hover: none)").matches; // a finger on a figure scrolls the page
@@ -66,20 +76,12 @@
     });
   };
 
-  const saveButton = (format, icon, filename) => ({
-    name: `save-${format}`, title: `Save as ${format.toUpperCase()}`, icon,
-    click: (graph) => Plotly.downloadImage(graph, { format, filename, scale: 2, width: graph._fullLayout.width, height: graph._fullLayout.height }),
-  });
-
   const draw = (plot) => {
-    const { element, spec, name } = plot;
+    const { element, spec } = plot;
     const panels = element.closest(".panels").children.length;
     const width = printing ? (panels > 1 ? FULL_PAGE_PX / 2 - 12 : FULL_PAGE_PX) : element.clientWidth;
     plot.width = width;
-    return Plotly.react(element, spec.data.map((trace) => themed(trace)), layoutOf(spec, width), {
-      displaylogo: false, responsive: false, displayModeBar: "hover",
-      modeBarButtons: [["resetScale2d", saveButton("png", Plotly.Icons.camera, name), saveButton("svg", Plotly.Icons.disk, name)]],
-    });
+    return Plotly.react(element, spec.data.map((trace) => themed(trace)), layoutOf(spec, width), plot.config);
   };
   const drawAll = () => plots.forEach(draw);
 
