@@ -1,0 +1,292 @@
+//! The tables of an agent's configuration file.
+
+use std::path::PathBuf;
+
+use pleiad_estimation::fold::{DEFAULT_GATE, FoldConfig};
+use pleiad_estimation::joint::ErrorForm;
+use serde::{Deserialize, Serialize};
+
+/// How the robots of a team share what they see.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Strategy {
+    /// Every robot folds all facts: the joint filter, exactly.
+    #[default]
+    Exact,
+    /// Observations of other robots are ignored: the baseline.
+    Independent,
+}
+
+/// The error of a pose, as written in a configuration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorName {
+    /// Right-invariant.
+    #[default]
+    Invariant,
+    /// Additive: the textbook filter.
+    Additive,
+}
+
+/// `[filter]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FilterSection {
+    /// Coordinates of the error.
+    pub error: ErrorName,
+    /// Gate on the normalized innovation squared for measurements of dimension 1, 2, 3.
+    pub gate: [f64; 3],
+}
+
+impl Default for FilterSection {
+    fn default() -> Self {
+        Self { error: ErrorName::Invariant, gate: DEFAULT_GATE }
+    }
+}
+
+impl FilterSection {
+    /// The filter's configuration.
+    pub fn fold(&self) -> FoldConfig {
+        let form = match self.error {
+            ErrorName::Invariant => ErrorForm::Invariant,
+            ErrorName::Additive => ErrorForm::Additive,
+        };
+        FoldConfig { form, gate: self.gate }
+    }
+}
+
+/// `[prior]`: where the robot is at its first odometry, in the map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorSection {
+    /// Position, m.
+    pub x_m: f64,
+    /// Position, m.
+    pub y_m: f64,
+    /// Heading, rad.
+    pub heading_rad: f64,
+    /// Standard deviation of the position per axis, m.
+    pub sigma_position_m: f64,
+    /// Standard deviation of the heading, rad.
+    pub sigma_heading_rad: f64,
+    /// The boot this prior is meant for. A robot that lost its journal has moved since its first boot:
+    /// it needs a new prior, for the boot index that its agent then prints.
+    #[serde(default)]
+    pub for_boot: u32,
+}
+
+/// `[motion]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionSection {
+    /// Wheel radius, m; needed for wheel angles.
+    pub wheel_radius_m: Option<f64>,
+    /// Track width, m; needed for wheel angles.
+    pub track_width_m: Option<f64>,
+    /// `odometry` or `gyro`.
+    pub yaw_source: YawName,
+    /// Subtracted from the gyro, rad/s.
+    pub gyro_bias_rad_s: f64,
+    /// Forward noise, m per root second.
+    pub forward_m_per_sqrt_s: f64,
+    /// Sideways noise, m per root second.
+    pub lateral_m_per_sqrt_s: f64,
+    /// Yaw noise, rad per root second.
+    pub yaw_rad_per_sqrt_s: f64,
+    /// Forward noise, m per root metre.
+    pub forward_m_per_sqrt_m: f64,
+    /// Yaw noise, rad per root metre.
+    pub yaw_rad_per_sqrt_m: f64,
+    /// Yaw noise, rad per root radian.
+    pub yaw_rad_per_sqrt_rad: f64,
+    /// No noise while odometry reports no motion.
+    pub quiet_at_standstill: bool,
+    /// A longer silence of the odometry ends the trajectory; the motion in it counts as unknown.
+    pub longest_gap_s: f64,
+    /// Fastest the robot can drive, m/s: bounds what it did in a gap.
+    pub speed_limit_m_s: f64,
+    /// Fastest it can turn, rad/s.
+    pub yaw_rate_limit_rad_s: f64,
+    /// Odometry samples kept to look back into.
+    pub history_samples: usize,
+}
+
+impl Default for MotionSection {
+    fn default() -> Self {
+        Self {
+            wheel_radius_m: None,
+            track_width_m: None,
+            yaw_source: YawName::Odometry,
+            gyro_bias_rad_s: 0.0,
+            forward_m_per_sqrt_s: 0.02,
+            lateral_m_per_sqrt_s: 0.0,
+            yaw_rad_per_sqrt_s: 0.01,
+            forward_m_per_sqrt_m: 0.0,
+            yaw_rad_per_sqrt_m: 0.0,
+            yaw_rad_per_sqrt_rad: 0.0,
+            quiet_at_standstill: false,
+            longest_gap_s: 2.0,
+            speed_limit_m_s: 1.0,
+            yaw_rate_limit_rad_s: 1.5,
+            history_samples: 150_000,
+        }
+    }
+}
+
+/// Where the yaw of dead reckoning comes from, as written in a configuration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum YawName {
+    /// The odometry.
+    #[default]
+    Odometry,
+    /// The gyro.
+    Gyro,
+}
+
+/// `[sensors]`: one standard deviation per component, and what is known to be off.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SensorsSection {
+    /// Known bias of every range reading, subtracted, m.
+    pub range_bias_m: f64,
+    /// Full relative pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_pose: Option<PoseNoise>,
+    /// Relative position.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_position: Option<LengthNoise>,
+    /// Range alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range: Option<LengthNoise>,
+    /// Bearing alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bearing: Option<AngleNoise>,
+    /// Range and bearing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_bearing: Option<RangeBearingNoise>,
+    /// Absolute position.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gps: Option<LengthNoise>,
+    /// Absolute heading.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heading: Option<AngleNoise>,
+}
+
+/// Noise of a pose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseNoise {
+    /// Per axis, m.
+    pub sigma_position_m: f64,
+    /// Yaw, rad.
+    pub sigma_yaw_rad: f64,
+}
+
+/// Noise of a length or of each axis of a position.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LengthNoise {
+    /// m.
+    pub sigma_m: f64,
+}
+
+/// Noise of an angle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AngleNoise {
+    /// rad.
+    pub sigma_rad: f64,
+}
+
+/// Noise of range and bearing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RangeBearingNoise {
+    /// m.
+    pub sigma_range_m: f64,
+    /// rad.
+    pub sigma_bearing_rad: f64,
+}
+
+/// `[clock]`: team time = local + offset + rate (local - reference).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ClockSection {
+    /// Local seconds at which the offset holds.
+    pub reference_s: f64,
+    /// s.
+    pub offset_s: f64,
+    /// Parts per billion.
+    pub rate_ppb: i32,
+}
+
+/// One of `[[landmarks]]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LandmarkRow {
+    /// Number.
+    pub id: u32,
+    /// m.
+    pub x_m: f64,
+    /// m.
+    pub y_m: f64,
+}
+
+/// `[bus]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BusSection {
+    /// Zenoh endpoints to listen on.
+    pub listen: Vec<String>,
+    /// Zenoh endpoints of peers or routers to dial.
+    pub connect: Vec<String>,
+    /// `peer` or `client` (of a router).
+    pub mode: BusMode,
+    /// Find peers by UDP multicast.
+    pub multicast: bool,
+    /// Between two statuses, s: how fast a missed message is noticed.
+    pub status_period_s: f64,
+}
+
+impl Default for BusSection {
+    fn default() -> Self {
+        Self {
+            listen: vec!["tcp/127.0.0.1:0".to_owned()],
+            connect: Vec::new(),
+            mode: BusMode::Peer,
+            multicast: false,
+            status_period_s: 0.5,
+        }
+    }
+}
+
+/// How an agent takes part in the network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BusMode {
+    /// Linked with the other agents directly.
+    #[default]
+    Peer,
+    /// Through a zenoh router.
+    Client,
+}
+
+/// `[output]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OutputSection {
+    /// Journal and results go here; without it the agent forgets everything when it ends.
+    pub directory: Option<PathBuf>,
+    /// Estimates per second of team time, published and written.
+    pub estimate_rate_hz: f64,
+    /// Longest time between two fsyncs of the journal, s; every entry is written before it is published
+    /// in any case, so that only a loss of power can cost what is younger than this.
+    pub fsync_period_s: f64,
+}
+
+impl Default for OutputSection {
+    fn default() -> Self {
+        Self { directory: None, estimate_rate_hz: 10.0, fsync_period_s: 0.2 }
+    }
+}
