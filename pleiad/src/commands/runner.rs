@@ -22,7 +22,7 @@ use tokio::io::{AsyncBufReadExt, BufReader};
 
 use super::agent::runtime;
 use crate::evaluation::{RobotResult, RunResult};
-use crate::setup::Team;
+use crate::setup::{self, Team};
 use crate::{folder, output};
 
 /// Digest rounds granted after the last sample; without faults one is enough.
@@ -48,7 +48,8 @@ pub fn in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
     let mut notes = team.notes.clone();
     if !agreed {
         notes.push(
-            "the robots did not agree at the end: some observations stayed without their other half".to_owned(),
+            "the robots did not agree at the end: some observations stayed without their other half"
+                .to_owned(),
         );
     }
     let mut robots = BTreeMap::new();
@@ -214,7 +215,11 @@ async fn feed(
         let mut lines = BufReader::new(stdout).lines();
         while let Some(line) = lines.next_line().await? {
             if let Ok(second) = line.parse::<f64>() {
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds of a run")]
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "seconds of a run"
+                )]
                 bar.set_position((second - first.seconds()).max(0.0) as u64);
             }
         }
@@ -253,7 +258,10 @@ fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult>
         // An independent fold of what the agent wrote down must give the bits it announced.
         let folded = own.fingerprint().to_string();
         if folded != summary.estimate {
-            bail!("robot {robot}: the agent ended with estimate {}, its journal folds to {folded}", summary.estimate);
+            bail!(
+                "robot {robot}: the agent ended with estimate {}, its journal folds to {folded}",
+                summary.estimate
+            );
         }
         for (reason, count) in &summary.samples_refused {
             notes.push(format!("robot {robot}: {count} samples refused ({reason})"));
@@ -263,7 +271,9 @@ fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult>
         ledger.get_or_insert(own);
         robots.insert(*robot, RobotResult { settled, online, summary });
     }
-    write_folder(&with_samples(&team.recording, &received), &out.join("recording"), Overwrite::Refuse)?;
+    let recording = out.join("recording");
+    write_folder(&with_samples(&team.recording, &received), &recording, Overwrite::Refuse)?;
+    setup::write_beside(&team.agents, &recording)?;
     let processes = robots.len();
     let ledger = ledger.context("the team has no robot")?;
     Ok(RunResult { robots, ledger, notes, wall_s, processes })
