@@ -89,7 +89,8 @@ pub struct RunArgs {
 
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// A recording folder, a run folder, or an MRCLAM folder.
+    /// A recording folder, a run folder, or an MRCLAM folder. The robots of a run start as they were told
+    /// then (priors.toml), others where the ground truth says.
     pub recording: PathBuf,
     /// How the robots share what they see.
     #[arg(long, value_enum, default_value_t = StrategyArg::Exact)]
@@ -103,7 +104,7 @@ pub struct ReplayArgs {
     /// Position fixes made from ground truth, as in 1@1.0:0.3 (robot 1, 1 Hz, sigma 0.3 m). Repeatable.
     #[arg(long, value_name = "ROBOT@HZ:SIGMA_M")]
     pub absolute: Vec<AbsoluteArg>,
-    /// Begin this many seconds into the time that all robots cover.
+    /// Begin this many seconds into the time that all robots cover, from ground truth.
     #[arg(long, default_value_t = 0.0)]
     pub start: f64,
     /// Length in seconds; to the end if absent.

@@ -1,7 +1,7 @@
 //! From a scenario or a recording to the configurations of a team's agents and the samples they get.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use pleiad_agent::config::{
@@ -37,6 +37,52 @@ pub struct NoiseFile {
     pub motion: MotionSection,
     /// As in an agent's configuration.
     pub sensors: SensorsSection,
+}
+
+/// File of a recording that says what the robots were told of their start: a table per robot's number. A
+/// robot that is not in it was told nothing.
+const PRIORS: &str = "priors.toml";
+
+/// The recording in a run folder, or the folder itself.
+pub fn recording_folder(folder: &Path) -> PathBuf {
+    let within = folder.join("recording");
+    if within.is_dir() { within } else { folder.to_owned() }
+}
+
+/// Writes beside a recording what a replay has to know of its robots: noise, geometry and start.
+pub fn write_beside(agents: &BTreeMap<RobotId, AgentConfig>, folder: &Path) -> anyhow::Result<()> {
+    let write = |name: &str, text: String| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+    };
+    let mut priors = BTreeMap::new();
+    for (robot, agent) in agents {
+        let (filter, motion, sensors) = (agent.filter.clone(), agent.motion.clone(), agent.sensors.clone());
+        write(&format!("noise-r{robot}.toml"), toml::to_string(&NoiseFile { filter, motion, sensors })?)?;
+        if let Some(prior) = &agent.prior {
+            priors.insert(robot.to_string(), prior);
+        }
+    }
+    write(PRIORS, toml::to_string(&priors)?)
+}
+
+/// What the robots of a recording were told of their start, if it says so.
+fn priors_beside(folder: &Path) -> anyhow::Result<Option<BTreeMap<RobotId, PriorSection>>> {
+    let path = folder.join(PRIORS);
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let tables: BTreeMap<String, PriorSection> =
+        toml::from_str(&text).with_context(|| format!("{}", path.display()))?;
+    let mut priors = BTreeMap::new();
+    for (name, prior) in tables {
+        let Ok(robot) = name.parse() else {
+            bail!("{}: found the table [{name}], expected the number of a robot", path.display());
+        };
+        priors.insert(RobotId(robot), prior);
+    }
+    Ok(Some(priors))
 }
 
 /// A team ready to run.
@@ -130,7 +176,7 @@ pub fn simulated(scenario: &Scenario, run: SimulatedRun, filter: FilterArgs) -> 
 }
 
 /// What a simulated robot's agent has to know: the noises the world was made with.
-pub fn noise_of(settings: &RobotSettings) -> NoiseFile {
+fn noise_of(settings: &RobotSettings) -> NoiseFile {
     let noise = &settings.odometry.noise;
     let motion = MotionSection {
         wheel_radius_m: Some(settings.wheel_radius_m),
@@ -195,14 +241,21 @@ pub struct ReplayOptions<'a> {
     pub mrclam: bool,
 }
 
-/// A recorded team, started where the ground truth says.
+/// A recorded team, started as it was told if the recording says how and is replayed from its beginning,
+/// else where the ground truth says.
 pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Result<Team> {
-    let (first, last) = recording.common_time().context(
-        "the robots' odometry and ground truth have no time in common; a replay starts from ground truth",
-    )?;
     if !(options.start_s.is_finite() && options.start_s >= 0.0) {
         bail!("--start {}: expected zero or a positive number of seconds", options.start_s);
     }
+    let told = if options.start_s > 0.0 { None } else { priors_beside(options.folder)? };
+    let (first, last) = if told.is_some() {
+        let times = || recording.robots.values().flat_map(RobotRecording::samples).map(|sample| sample.time);
+        times().min().zip(times().max()).context("there is not a single sample in the recording")?
+    } else {
+        recording.common_time().context(
+            "the robots' odometry and ground truth have no time in common; a replay starts from ground truth",
+        )?
+    };
     let start = first.plus_seconds(options.start_s);
     let end = match options.seconds {
         Some(seconds) if seconds.is_finite() && seconds > 0.0 => start.plus_seconds(seconds).min(last),
@@ -234,8 +287,9 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
         let noise = noise_for(*robot, &recording, options)?;
         let mut agent = configuration(*robot, &noise, options.filter, &landmarks);
         let mut fed = channels.samples();
-        let placed = prior(channels);
-        if let Some((time, prior)) = placed {
+        if let Some(told) = &told {
+            agent.prior = told.get(robot).cloned();
+        } else if let Some((time, prior)) = prior(channels) {
             let before = fed.len();
             fed.retain(|sample| sample.time >= time);
             if fed.len() < before {

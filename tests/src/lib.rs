@@ -1,3 +1,6 @@
 //! Tests across crates and processes. What lives here is what they share.
 
 pub mod architecture;
+pub mod feeder;
+pub mod program;
+pub mod stage;

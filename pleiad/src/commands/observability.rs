@@ -48,7 +48,8 @@ pub fn of_run(result: &RunResult) -> Observability {
 pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
     let filter = FilterArgs { strategy: StrategyArg::Exact, error: ErrorArg::Invariant };
     let team = if args.input.is_dir() {
-        let (recording, ingest) = pleiad_recording::open(&args.input, &ReadOptions::default())?;
+        let folder = setup::recording_folder(&args.input);
+        let (recording, ingest) = pleiad_recording::open(&folder, &ReadOptions::default())?;
         setup::recorded(
             &recording,
             &ReplayOptions {
@@ -59,7 +60,7 @@ pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
                 seconds: args.seconds,
                 seed: 1,
                 noise: None,
-                folder: &args.input,
+                folder: &folder,
                 mrclam: ingest.form == pleiad_recording::Form::Mrclam,
             },
         )?

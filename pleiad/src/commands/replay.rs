@@ -14,7 +14,7 @@ use super::runner::{self, Feeder, ProcessOptions};
 use crate::cli::ReplayArgs;
 use crate::evaluation::{self, NisJson, RunResult};
 use crate::setup::{self, FilterArgs, ReplayOptions, Team};
-use crate::{folder, output, payload};
+use crate::{output, payload};
 
 /// `replay --json` and `summary.json`.
 #[derive(Debug, Serialize)]
@@ -71,8 +71,9 @@ pub struct SecondsJson {
 }
 
 pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
+    let folder = setup::recording_folder(&args.recording);
     let (recording, ingest) =
-        pleiad_recording::open(&args.recording, &ReadOptions { skip_bad_rows: args.skip_bad_rows })?;
+        pleiad_recording::open(&folder, &ReadOptions { skip_bad_rows: args.skip_bad_rows })?;
     let options = ReplayOptions {
         filter: FilterArgs { strategy: args.strategy, error: args.error },
         landmarks: &args.landmarks,
@@ -81,11 +82,11 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         seconds: args.seconds,
         seed: args.seed,
         noise: args.noise.as_deref(),
-        folder: &args.recording,
+        folder: &folder,
         mrclam: ingest.form == pleiad_recording::Form::Mrclam,
     };
     let team = setup::recorded(&recording, &options)?;
-    let out = folder::create(args.out.as_deref(), &format!("replay-{}", recording.name))?;
+    let out = crate::folder::create(args.out.as_deref(), &format!("replay-{}", recording.name))?;
     let result = if args.processes {
         let options =
             ProcessOptions { feeder: Feeder::Samples, speed: None, restart: false, label: "replaying" };

@@ -27,11 +27,6 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         label: &scenario.name,
     };
     let result = runner::as_processes(&team, &out, &options)?;
-    // Beside the samples stands what a replay has to know of each robot.
-    for (robot, settings) in &scenario.robots {
-        let path = out.join("recording").join(format!("noise-r{robot}.toml"));
-        std::fs::write(&path, toml::to_string(&setup::noise_of(settings))?)?;
-    }
     let json = write_run(&team, &result, &out, &command_line(), None)?;
     output::print(args.json, &json, &text(&json))
 }

@@ -22,7 +22,7 @@ use tokio::io::{AsyncBufReadExt, BufReader};
 
 use super::agent::runtime;
 use crate::evaluation::{RobotResult, RunResult};
-use crate::setup::Team;
+use crate::setup::{self, Team};
 use crate::{folder, output};
 
 /// Digest rounds granted after the last sample; without faults one is enough.
@@ -271,7 +271,9 @@ fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult>
         ledger.get_or_insert(own);
         robots.insert(*robot, RobotResult { settled, online, summary });
     }
-    write_folder(&with_samples(&team.recording, &received), &out.join("recording"), Overwrite::Refuse)?;
+    let recording = out.join("recording");
+    write_folder(&with_samples(&team.recording, &received), &recording, Overwrite::Refuse)?;
+    setup::write_beside(&team.agents, &recording)?;
     let processes = robots.len();
     let ledger = ledger.context("the team has no robot")?;
     Ok(RunResult { robots, ledger, notes, wall_s, processes })

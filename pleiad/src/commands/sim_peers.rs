@@ -11,7 +11,7 @@ use pleiad_sim_peers::{FeedOptions, Scenario, feed, simulate};
 
 use super::agent::runtime;
 use crate::cli::SimPeersArgs;
-use crate::output;
+use crate::{output, setup};
 
 /// Team time per step: far below the two seconds beyond which a stamp counts as wrong, and short enough
 /// that online estimates lag by little.
@@ -23,7 +23,7 @@ pub fn run(args: &SimPeersArgs) -> anyhow::Result<()> {
         bail!("--speed {speed}: expected a positive number");
     }
     let recording = if args.input.is_dir() {
-        pleiad_recording::open(&args.input, &ReadOptions::default())?.0
+        pleiad_recording::open(&setup::recording_folder(&args.input), &ReadOptions::default())?.0
     } else {
         let scenario = Scenario::load(&args.input)?;
         simulate(&scenario, args.seed.unwrap_or(scenario.seed))?.recording

@@ -1,0 +1,415 @@
+//! A simulated team whose agents are processes on this machine.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "helpers of tests")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, MutexGuard};
+use std::time::Duration;
+
+use pleiad_agent::config::{
+    AgentConfig, BusSection, ClockSection, FilterSection, LengthNoise, MotionSection, OutputSection,
+    PoseNoise, PriorSection, SensorsSection, Strategy,
+};
+use pleiad_agent::journal::Journal;
+use pleiad_agent::{Record, driver};
+use pleiad_bus::{Bus, ZenohBus, ZenohConfig};
+use pleiad_coordinator::{AgentEntry, Backoff, CoordinatorConfig, Restart, differences, endpoints};
+use pleiad_estimation::fact::{Entry, LogId};
+use pleiad_estimation::fold::FoldConfig;
+use pleiad_estimation::ledger::{Insertion, Ledger};
+use pleiad_estimation::sample::Sample;
+use pleiad_estimation::{BootIndex, Pose2, RobotId};
+use pleiad_protocol::keys::{self, Kind};
+use pleiad_protocol::{ControlReply, ControlRequest, Message, Status, TeamName};
+use pleiad_sim_peers::{Fleet, FleetOptions, Prior, Scenario, SimulatedRun, simulate};
+use tempfile::TempDir;
+use tokio::time::Instant;
+
+use crate::program;
+
+/// Far beyond what anything here takes; reached only by failure.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(50);
+/// An agent that is there answers within this.
+const ANSWER: Duration = Duration::from_secs(5);
+
+/// Wanderers that see one another's pose; the first has GPS.
+pub const SCENARIO: &str = r#"
+name = "stage"
+seed = 11
+duration_s = 60.0
+team_size = 3
+truth_rate_hz = 10.0
+
+[arena]
+width_m = 12.0
+height_m = 12.0
+
+[defaults.odometry]
+kind = "velocity"
+rate_hz = 25.0
+
+[defaults.relative]
+rate_hz = 2.0
+kind = "pose"
+max_range_m = 17.0
+sigma_position_m = 0.05
+sigma_yaw_rad = 0.02
+
+[[robots]]
+id = 1
+gps = { rate_hz = 1.0, sigma_m = 0.3 }
+"#;
+
+/// A simulated team, configured but not started. Dropped, it kills every process that works in its
+/// folder, whoever started it.
+pub struct Stage {
+    /// The team's name, like no other's.
+    pub team: TeamName,
+    /// What the robots sense, and where they truly are.
+    pub run: SimulatedRun,
+    /// A bus linked with every agent.
+    pub bus: Arc<ZenohBus>,
+    configs: BTreeMap<RobotId, AgentConfig>,
+    scenario: Scenario,
+    folder: TempDir,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Stage {
+    /// The team of [`SCENARIO`] with this many robots.
+    #[allow(clippy::await_holding_lock, reason = "the turn is for the whole of a test, on its own runtime")]
+    pub async fn set(robots: u32) -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let turn = program::turn();
+        let text = SCENARIO.replace("team_size = 3", &format!("team_size = {robots}"));
+        let scenario = Scenario::from_toml(&text, "stage.toml").unwrap();
+        let run = simulate(&scenario, scenario.seed).unwrap();
+        let robots: Vec<_> = scenario.robots.keys().copied().collect();
+        let endpoints = endpoints(&robots).unwrap();
+        let connect = endpoints.values().map(|endpoint| endpoint.listen.clone()).collect();
+        let network = ZenohConfig { connect, ..ZenohConfig::default() };
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let name = format!("stage-{}-{count}", std::process::id());
+        let mut stage = Self {
+            team: TeamName::new(&name).unwrap(),
+            bus: Arc::new(ZenohBus::open(&network).await.unwrap()),
+            configs: BTreeMap::new(),
+            folder: tempfile::tempdir().unwrap(),
+            scenario,
+            run,
+            _turn: turn,
+        };
+        std::fs::write(stage.scenario_path(), text).unwrap();
+        for (robot, endpoint) in endpoints {
+            let bus = BusSection {
+                listen: vec![endpoint.listen],
+                connect: endpoint.connect,
+                status_period_s: 0.1,
+                ..BusSection::default()
+            };
+            std::fs::create_dir_all(stage.folder_of(robot)).unwrap();
+            stage.configure(stage.agent(robot, bus));
+        }
+        stage
+    }
+
+    /// What a robot's agent is told of the world it is in.
+    fn agent(&self, robot: RobotId, bus: BusSection) -> AgentConfig {
+        let settings = &self.scenario.robots[&robot];
+        let noise = &settings.odometry.noise;
+        AgentConfig {
+            team: self.team.to_string(),
+            robot: robot.0,
+            strategy: Strategy::Exact,
+            filter: FilterSection::default(),
+            prior: self.run.priors.get(&robot).map(prior_section),
+            motion: MotionSection {
+                forward_m_per_sqrt_s: noise.speed_m_per_sqrt_s,
+                lateral_m_per_sqrt_s: noise.lateral_m_per_sqrt_s,
+                yaw_rad_per_sqrt_s: noise.yaw_rad_per_sqrt_s,
+                speed_limit_m_s: settings.motion.speed_m_s,
+                yaw_rate_limit_rad_s: settings.motion.max_yaw_rate_rad_s,
+                ..MotionSection::default()
+            },
+            sensors: SensorsSection {
+                relative_pose: Some(PoseNoise {
+                    sigma_position_m: settings.relative.sigma_position_m,
+                    sigma_yaw_rad: settings.relative.sigma_yaw_rad,
+                }),
+                gps: (settings.gps.rate_hz > 0.0).then_some(LengthNoise { sigma_m: settings.gps.sigma_m }),
+                ..SensorsSection::default()
+            },
+            clock: ClockSection::default(),
+            landmarks: Vec::new(),
+            bus,
+            output: OutputSection { directory: Some(self.folder_of(robot)), ..OutputSection::default() },
+        }
+    }
+
+    fn configure(&mut self, config: AgentConfig) {
+        let robot = RobotId(config.robot);
+        std::fs::write(self.config_path(robot), toml::to_string(&config).unwrap()).unwrap();
+        self.configs.insert(robot, config);
+    }
+
+    /// Tells a robot another start than its first one.
+    pub fn place(&mut self, robot: RobotId, pose: Pose2) {
+        let settings = self.scenario.robots[&robot].prior;
+        let prior = Prior {
+            pose,
+            sigma_position_m: settings.sigma_position_m,
+            sigma_heading_rad: settings.sigma_heading_rad,
+        };
+        let mut config = self.configs[&robot].clone();
+        config.prior = Some(prior_section(&prior));
+        self.configure(config);
+    }
+
+    /// The robots.
+    pub fn robots(&self) -> BTreeSet<RobotId> {
+        self.configs.keys().copied().collect()
+    }
+
+    /// The scenario's file.
+    pub fn scenario_path(&self) -> PathBuf {
+        self.folder.path().join("scenario.toml")
+    }
+
+    /// Where a robot's agent keeps its journal.
+    pub fn folder_of(&self, robot: RobotId) -> PathBuf {
+        self.folder.path().join(format!("r{robot}"))
+    }
+
+    /// The configuration of a robot's agent.
+    pub fn config_path(&self, robot: RobotId) -> PathBuf {
+        self.folder_of(robot).join("agent.toml")
+    }
+
+    /// Where the agents listen.
+    pub fn endpoints(&self) -> Vec<String> {
+        self.configs.values().flat_map(|config| config.bus.listen.clone()).collect()
+    }
+
+    /// What each robot senses.
+    pub fn samples(&self) -> BTreeMap<RobotId, Vec<Sample>> {
+        self.run.recording.robots.iter().map(|(robot, channels)| (*robot, channels.samples())).collect()
+    }
+
+    /// The configuration of a coordinator of these agents.
+    pub fn coordinator(&self) -> CoordinatorConfig {
+        let agent = |robot: &RobotId| AgentEntry {
+            robot: robot.0,
+            config: self.config_path(*robot),
+            log: Some(self.folder_of(*robot).join("agent.log")),
+        };
+        CoordinatorConfig {
+            team: self.team.to_string(),
+            executable: Some(program::pleiad().to_owned()),
+            restart: Restart::Never,
+            detached: false,
+            status_period_s: 0.1,
+            shutdown_timeout_s: PATIENCE.as_secs_f64(),
+            record: None,
+            backoff: Backoff::default(),
+            bus: pleiad_coordinator::BusSection { connect: self.endpoints(), ..Default::default() },
+            agents: self.configs.keys().map(agent).collect(),
+        }
+    }
+
+    /// Starts a coordinator as a process of its own; returns the process.
+    pub fn start_coordinator(&self, config: &CoordinatorConfig) -> std::process::Child {
+        let path = self.folder.path().join("coordinator.toml");
+        std::fs::write(&path, toml::to_string(config).unwrap()).unwrap();
+        self.start("coordinator", &path)
+    }
+
+    /// Starts a robot's agent by hand, as on a machine of its own.
+    pub fn start_agent(&self, robot: RobotId) -> std::process::Child {
+        self.start("agent", &self.config_path(robot))
+    }
+
+    fn start(&self, what: &str, config: &Path) -> std::process::Child {
+        let log = File::create(config.with_extension("log")).unwrap();
+        let mut command = Command::new(program::pleiad());
+        command.arg(what).arg("--config").arg(config).current_dir(self.folder.path());
+        command.stdin(Stdio::null()).stdout(log.try_clone().unwrap()).stderr(log).spawn().unwrap()
+    }
+
+    /// The ids of all processes that work in this stage's folder.
+    pub fn processes(&self) -> Vec<u32> {
+        let folder = self.folder.path().as_os_str().as_encoded_bytes();
+        let works_here = |pid: &u32| {
+            let line = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+            line.windows(folder.len()).any(|part| part == folder)
+        };
+        let entries = std::fs::read_dir("/proc").unwrap().filter_map(Result::ok);
+        let pids = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+        pids.filter(works_here).collect()
+    }
+
+    /// Asks a robot's agent; `None` if it does not answer.
+    pub async fn ask(&self, robot: RobotId, request: ControlRequest) -> Option<ControlReply> {
+        let key = keys::of(&self.team, robot, Kind::Control);
+        let reply = self.bus.request(&key, Message::ControlRequest(request).encode(), ANSWER).await.ok()?;
+        match Message::decode(&reply) {
+            Ok(Message::ControlReply(reply)) => Some(reply),
+            other => panic!("robot {robot} answered {other:?}"),
+        }
+    }
+
+    /// The status of a robot's agent, if it answers.
+    pub async fn status(&self, robot: RobotId) -> Result<Status, &'static str> {
+        match self.ask(robot, ControlRequest::Status).await {
+            Some(ControlReply::Status(status)) => Ok(status),
+            Some(_) => Err("not a status"),
+            None => Err("no answer"),
+        }
+    }
+
+    /// Waits until this holds of the robot's status.
+    pub async fn until(&self, robot: RobotId, holds: impl Fn(&Status) -> bool) -> Status {
+        let deadline = Instant::now() + PATIENCE;
+        let mut looks = tokio::time::interval(LOOK);
+        loop {
+            looks.tick().await;
+            let status = self.status(robot).await;
+            match status {
+                Ok(status) if holds(&status) => return status,
+                other => assert!(
+                    Instant::now() < deadline,
+                    "robot {robot} never got there: {other:?}\n{}",
+                    self.logs()
+                ),
+            }
+        }
+    }
+
+    /// Waits until the agents of these robots answer.
+    pub async fn until_up(&self, robots: impl IntoIterator<Item = RobotId>) {
+        for robot in robots {
+            self.until(robot, |_| true).await;
+        }
+    }
+
+    /// Waits until the team has settled: all input ended, all observations answered, all the same.
+    pub async fn settled(&self) -> BTreeMap<RobotId, Status> {
+        let deadline = Instant::now() + PATIENCE;
+        let mut looks = tokio::time::interval(LOOK);
+        loop {
+            looks.tick().await;
+            let mut statuses = BTreeMap::new();
+            for robot in self.robots() {
+                statuses.insert(robot, self.status(robot).await);
+            }
+            let differences = differences(&statuses);
+            if differences.is_empty() {
+                return statuses.into_iter().map(|(robot, status)| (robot, status.unwrap())).collect();
+            }
+            assert!(Instant::now() < deadline, "not settled: {differences:#?}\n{}", self.logs());
+        }
+    }
+
+    /// Tells all agents to end, and waits until there is no process left.
+    pub async fn shut_down(&self) {
+        for robot in self.robots() {
+            assert_eq!(self.ask(robot, ControlRequest::Shutdown).await, Some(ControlReply::Accepted));
+        }
+        let deadline = Instant::now() + PATIENCE;
+        let mut looks = tokio::time::interval(LOOK);
+        while !self.processes().is_empty() {
+            assert!(Instant::now() < deadline, "still there: {:?}\n{}", self.processes(), self.logs());
+            looks.tick().await;
+        }
+    }
+
+    /// The entries in a robot's journal, as it wrote them down.
+    pub fn journal(&self, robot: RobotId) -> Vec<Entry> {
+        let records = Journal::read(&self.folder_of(robot).join(driver::JOURNAL)).unwrap();
+        let entry = |record| match record {
+            Record::Entry(entry) => Some(entry),
+            Record::Sample(_) => None,
+        };
+        records.into_iter().filter_map(entry).collect()
+    }
+
+    /// All entries of all journals folded from nothing: what an undisturbed robot would believe.
+    pub fn fold(&self) -> Ledger {
+        fold(self.robots().into_iter().flat_map(|robot| self.journal(robot)))
+    }
+
+    /// Asserts that all agents have one estimate, and that it is what a fold from nothing of what they
+    /// wrote down gives: of all journals together, and of each by itself. Returns that fold.
+    pub fn assert_undisturbed(&self, statuses: &BTreeMap<RobotId, Status>) -> Ledger {
+        assert_eq!(statuses.keys().copied().collect::<BTreeSet<_>>(), self.robots());
+        let mut ledger = self.fold();
+        let expected = ledger.fingerprint();
+        for (robot, status) in statuses {
+            assert_eq!(status.estimate, expected, "estimate of robot {robot}");
+            assert_eq!(fold(self.journal(*robot)).fingerprint(), expected, "journal of robot {robot}");
+        }
+        ledger
+    }
+
+    /// The same samples through nodes in this process, without processes, network or disk.
+    pub fn in_process(&self) -> Ledger {
+        let configs = self.configs.values().map(|config| config.node().unwrap()).collect();
+        let mut fleet = Fleet::new(configs, &FleetOptions::default()).unwrap();
+        let samples = self.samples();
+        fleet.feed(&samples, |_| {});
+        let last = samples.values().flatten().map(|sample| sample.time).max().unwrap();
+        assert!(fleet.settle(last, 10), "the fleet did not agree");
+        fleet.into_outcomes().into_values().next().unwrap().node.ledger().clone()
+    }
+
+    /// The ends of what the agents logged, for messages.
+    fn logs(&self) -> String {
+        let tail = |robot: RobotId| {
+            let text = std::fs::read_to_string(self.folder_of(robot).join("agent.log")).unwrap_or_default();
+            let lines: Vec<_> = text.lines().rev().take(10).collect();
+            format!("robot {robot}: {}", lines.into_iter().rev().collect::<Vec<_>>().join("\n"))
+        };
+        self.robots().into_iter().map(tail).collect::<Vec<_>>().join("\n")
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        let pids = self.processes().into_iter().map(|pid| pid.to_string());
+        let _ = Command::new("kill").arg("-KILL").args(pids).stderr(Stdio::null()).status();
+    }
+}
+
+/// Entries folded from nothing, in the order given.
+pub fn fold(entries: impl IntoIterator<Item = Entry>) -> Ledger {
+    let mut ledger = Ledger::new(FoldConfig::default());
+    for entry in entries {
+        let id = entry.id;
+        let insertion = ledger.insert(entry);
+        let good = matches!(insertion, Insertion::Added { .. } | Insertion::Duplicate | Insertion::Waiting);
+        assert!(good, "{id}: {insertion:?}");
+    }
+    ledger.settle();
+    ledger
+}
+
+/// The log of a robot's boot.
+pub fn log(robot: RobotId, boot: u32) -> LogId {
+    LogId { robot, boot: BootIndex(boot) }
+}
+
+fn prior_section(prior: &Prior) -> PriorSection {
+    PriorSection {
+        x_m: prior.pose.x_m(),
+        y_m: prior.pose.y_m(),
+        heading_rad: prior.pose.yaw_rad(),
+        sigma_position_m: prior.sigma_position_m,
+        sigma_heading_rad: prior.sigma_heading_rad,
+        for_boot: 0,
+    }
+}

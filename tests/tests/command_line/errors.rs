@@ -1,0 +1,111 @@
+//! What is wrong is said on stderr, by its name; the exit code says that something is, and stdout nothing.
+
+use pleiad_tests::program::run;
+
+use crate::{SCENARIO, recording, scenario};
+
+/// Runs the program where the scenario and its recording are, and checks that it fails and says all this.
+fn refused(arguments: &[&str], words: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    scenario(folder.path());
+    recording(folder.path());
+    std::fs::create_dir(folder.path().join("full")).unwrap();
+    std::fs::write(folder.path().join("full").join("notes.txt"), "mine").unwrap();
+    let misspelt = SCENARIO.replace("rate_hz = 2.0", "rate_hz = 2.0\nmax_rnage_m = 3.0");
+    std::fs::write(folder.path().join("misspelt.toml"), misspelt).unwrap();
+    let agent = "team = \"pleiad\"\nrobot = 1\n\n[motion]\nlongest_gab_s = 1.0\n";
+    std::fs::write(folder.path().join("agent.toml"), agent).unwrap();
+    let coordinator = "team = \"pleiad\"\nagents = []\nrestrat = \"never\"\n";
+    std::fs::write(folder.path().join("coordinator.toml"), coordinator).unwrap();
+
+    let stderr = run(folder.path(), arguments).failure();
+    for word in words {
+        assert!(stderr.contains(word), "{word} is missing in: {stderr}");
+    }
+    let notes = std::fs::read_to_string(folder.path().join("full").join("notes.txt")).unwrap();
+    assert_eq!(notes, "mine");
+}
+
+/// The line of the scenario that has this text, from 1.
+fn line(text: &str) -> usize {
+    SCENARIO.lines().position(|line| line == text).unwrap() + 1
+}
+
+#[test]
+fn an_unknown_key_of_a_scenario_is_named_with_file_and_line() {
+    let place = format!("misspelt.toml:{}", line("rate_hz = 2.0") + 1);
+    for command in ["run", "observability"] {
+        refused(&[command, "misspelt.toml"], &["max_rnage_m", &place]);
+    }
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named() {
+    refused(&["run", "nowhere.toml", "--out", "out"], &["nowhere.toml"]);
+    refused(&["replay", "nowhere", "--out", "out"], &["nowhere", "no such folder"]);
+    refused(&["replay", "small.toml", "--out", "out"], &["small.toml", "file"]);
+    refused(&["observability", "nowhere.toml"], &["nowhere.toml"]);
+    refused(&["agent", "--config", "nowhere.toml"], &["nowhere.toml"]);
+    refused(&["coordinator", "--config", "nowhere.toml"], &["nowhere.toml"]);
+    refused(
+        &["replay", "recording", "--noise", "nowhere.toml", "--out", "out"],
+        &["nowhere.toml", "cannot read"],
+    );
+}
+
+#[test]
+fn what_is_wrong_with_position_fixes_is_said() {
+    let form = "ROBOT@HZ:SIGMA_M";
+    for wrong in ["1", "1@1.0", "x@1.0:0.3", "1@0:0.3", "1@1.0:-0.3", "1@nan:0.3", "1@1.0:0.3:4"] {
+        refused(&["replay", "recording", "--absolute", wrong], &["--absolute", wrong, form]);
+    }
+    refused(&["replay", "recording", "--absolute", "9@1.0:0.3"], &["--absolute", "no robot 9"]);
+}
+
+#[test]
+fn what_is_wrong_with_a_choice_of_landmarks_is_said() {
+    for wrong in ["some", "6,x", "6;7", "-6"] {
+        let choice = format!("--landmarks={wrong}");
+        refused(&["replay", "recording", &choice], &["--landmarks", wrong, "known, none, or numbers"]);
+    }
+    refused(&["replay", "recording", "--landmarks", "6,99"], &["--landmarks", "99", "6, 7"]);
+}
+
+#[test]
+fn a_folder_that_holds_something_is_not_written_into() {
+    for command in [["run", "small.toml"], ["replay", "recording"]] {
+        refused(&[command[0], command[1], "--out", "full"], &["full", "not empty", "--out"]);
+    }
+    refused(&["demo", "--seconds", "120", "--out", "full"], &["full", "not empty", "--out"]);
+}
+
+#[test]
+fn an_unknown_key_of_a_configuration_is_named_with_file_and_line() {
+    refused(
+        &["agent", "--config", "agent.toml"],
+        &["agent.toml", "line 5", "longest_gab_s", "docs/agent.md"],
+    );
+    refused(
+        &["coordinator", "--config", "coordinator.toml"],
+        &["coordinator.toml", "line 3", "restrat", "docs/coordinator.md"],
+    );
+}
+
+#[test]
+fn numbers_out_of_range_are_named() {
+    refused(&["replay", "recording", "--start", "1000"], &["--start 1000"]);
+    refused(&["replay", "recording", "--start=-1"], &["--start -1"]);
+    refused(&["replay", "recording", "--seconds", "0"], &["--seconds 0"]);
+    refused(&["run", "small.toml", "--speed", "0"], &["--speed 0"]);
+    refused(&["demo", "--robots", "1"], &["--robots", "1"]);
+    refused(&["replay", "recording", "--strategy", "best"], &["--strategy", "best", "exact"]);
+    refused(&["sim-peers", "small.toml", "--team", "A Team", "--connect", "tcp/127.0.0.1:1"], &["A Team"]);
+}
+
+#[test]
+fn a_feed_that_nobody_takes_is_a_failure() {
+    // Nothing listens at port 1 of loopback.
+    let endpoint = "tcp/127.0.0.1:1";
+    let arguments = ["sim-peers", "small.toml", "--team", "nobody", "--connect", endpoint];
+    refused(&arguments, &["nobody", "not", "a single sample"]);
+}
