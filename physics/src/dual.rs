@@ -161,6 +161,7 @@ impl<const P: usize> PartialOrd<f64> for Dual<P> {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that are exact by construction")]
 mod tests {
     use super::*;
 

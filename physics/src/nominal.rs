@@ -114,6 +114,7 @@ nominal! {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that are exact by construction")]
 mod tests {
     use super::*;
 

@@ -87,6 +87,7 @@ impl<S: Scalar> Pose<S> {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that are exact by construction")]
 mod tests {
     use super::*;
     use crate::Dual;

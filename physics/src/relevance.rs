@@ -55,6 +55,7 @@ impl Relevance {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that are exact by construction")]
 mod tests {
     use super::*;
 
@@ -75,7 +76,7 @@ mod tests {
             (Relevance::CommandLag(0.001), 0.001, 0.002),
             (Relevance::Lag(0.001), 0.001, 0.004),
             (Relevance::LagChange(0.001), 0.001, 0.002),
-            (Relevance::Slope(0.000_8), f64::INFINITY, 0.000_8 / 0.196_133),
+            (Relevance::Slope(8e-4), f64::INFINITY, 8e-4 / 0.196_133),
         ] {
             for (floors, expected) in [(Floors::default(), without), (floors, with)] {
                 let found = relevance.threshold(&floors);

@@ -201,7 +201,7 @@ mod tests {
         let [left, right] = turned(&model(), (0.5, 1.5), &mut ActuatorState::default());
         let distance = 0.5 * (0.5 - 0.1 * (1.0 - (-5.0_f64).exp()));
         let yaw = 1.0 * (0.5 - 0.05 * (1.0 - (-10.0_f64).exp()));
-        assert!(((left + right) / 2.0 * 0.05 - distance).abs() < 1e-12);
+        assert!((f64::midpoint(left, right) * 0.05 - distance).abs() < 1e-12);
         assert!(((right - left) / 0.4 * 0.05 - yaw).abs() < 1e-12);
     }
 
@@ -221,7 +221,7 @@ mod tests {
         let [left, right] = turned(&model, (0.5, 1.5), &mut state);
         // A later start shifts the whole response: d distance / d delay = -v(end).
         let speed = 0.5 * (1.0 - (-5.0_f64).exp());
-        let found = (left.derivatives()[0] + right.derivatives()[0]) / 2.0 * 0.05;
+        let found = f64::midpoint(left.derivatives()[0], right.derivatives()[0]) * 0.05;
         assert!((found + speed).abs() < 1e-12, "{found}");
     }
 }

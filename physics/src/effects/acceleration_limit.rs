@@ -1,4 +1,5 @@
-//! 13. The servo cannot change the speed faster than its motors allow: a ramp instead of an exponential.
+//! Entry 13. The servo cannot change the speed faster than its motors allow: a ramp instead of an
+//! exponential.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

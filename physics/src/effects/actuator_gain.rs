@@ -1,4 +1,4 @@
-//! 54. Wheels reach more or less than what is commanded, separately along and in turns.
+//! Entry 54. Wheels reach more or less than what is commanded, separately along and in turns.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

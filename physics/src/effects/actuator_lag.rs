@@ -1,5 +1,5 @@
-//! 8. The servo is slower than declared, alike for speed and yaw rate; the value adds to the declared time
-//! constants.
+//! Entry 8. The servo is slower than declared, alike for speed and yaw rate; the value adds to the declared
+//! time constants.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

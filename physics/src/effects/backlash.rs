@@ -1,4 +1,4 @@
-//! 23. After a reversal the shaft crosses its play before the wheel follows: the play operator of
+//! Entry 23. After a reversal the shaft crosses its play before the wheel follows: the play operator of
 //! hysteresis theory.
 
 use crate::context::Context;

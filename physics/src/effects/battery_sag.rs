@@ -1,5 +1,5 @@
-//! 17. As the supply sags, wheels reach less of what is commanded: by the measured voltage, or by time
-//! where there is none.
+//! Entry 17. As the supply sags, wheels reach less of what is commanded: by the measured voltage, or by
+//! time where there is none.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -20,7 +20,7 @@ impl EffectModel for BatterySag {
         bad_data: false,
         parameters: &[
             Parameter::smooth("gain_per_v", "1/V", (-0.5, 0.5), Relevance::Size(0.002)),
-            Parameter::smooth("gain_per_s", "1/s", (-0.01, 0.01), Relevance::Size(0.00002)),
+            Parameter::smooth("gain_per_s", "1/s", (-0.01, 0.01), Relevance::Size(2e-5)),
         ],
         channels: &[Channel::Command, Channel::Encoders],
         equation: "u (1 + gain_per_v (V - V0) + gain_per_s t)",

@@ -1,4 +1,4 @@
-//! 44. Ranges are too long towards the edge of the field of view.
+//! Entry 44. Ranges are too long towards the edge of the field of view.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

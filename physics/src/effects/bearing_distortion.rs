@@ -1,4 +1,4 @@
-//! 42. The lens draws angles apart: an odd polynomial in the bearing.
+//! Entry 42. The lens draws angles apart: an odd polynomial in the bearing.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 49. Range and bearing are older than their stamps; the target is seen from where the robot was.
+//! Entry 49. Range and bearing are older than their stamps; the target is seen from where the robot was.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,6 +1,6 @@
-//! 7. After a reversal the castors swing round and push the body aside; the kick dies out with the path
-//! driven, not with time. It is to the left after a change to forward motion, to the right after one to
-//! reverse.
+//! Entry 7. After a reversal the castors swing round and push the body aside; the kick dies out with the
+//! path driven, not with time. It is to the left after a change to forward motion, to the right after one
+//! to reverse.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 10. The robot's clock runs faster than common time.
+//! Entry 10. The robot's clock runs faster than common time.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

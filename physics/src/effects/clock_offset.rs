@@ -1,4 +1,4 @@
-//! 10. The robot's clock is ahead of common time; its readings are older than their stamps.
+//! Entry 10. The robot's clock is ahead of common time; its readings are older than their stamps.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 9. A command takes effect later than its stamp says.
+//! Entry 9. A command takes effect later than its stamp says.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,5 +1,5 @@
-//! 57. The delay of a command is uniform from zero to `delay_s`; half of it is the mean, which a declared
-//! servo time constant may already contain.
+//! Entry 57. The delay of a command is uniform from zero to `delay_s`; half of it is the mean, which a
+//! declared servo time constant may already contain.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

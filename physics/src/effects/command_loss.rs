@@ -1,4 +1,4 @@
-//! 57. A command never arrives and the one before it holds on.
+//! Entry 57. A command never arrives and the one before it holds on.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

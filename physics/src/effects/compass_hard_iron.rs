@@ -1,4 +1,4 @@
-//! 31. Magnetized parts of the robot add a field that turns with it, given as a share of the Earth's
+//! Entry 31. Magnetized parts of the robot add a field that turns with it, given as a share of the Earth's
 //! horizontal field, which points along the map's y axis (north). Exact, not only for a small share.
 
 use crate::context::Context;

@@ -1,4 +1,4 @@
-//! 32. Iron in the robot bends the Earth's field: an error of two periods per turn.
+//! Entry 32. Iron in the robot bends the Earth's field: an error of two periods per turn.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

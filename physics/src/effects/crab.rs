@@ -1,4 +1,4 @@
-//! 55. The wheels point to the left of the body's forward direction.
+//! Entry 55. The wheels point to the left of the body's forward direction.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

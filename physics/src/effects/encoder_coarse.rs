@@ -1,4 +1,4 @@
-//! 22. The encoder counts fewer ticks per turn than declared; 0 stands for as declared.
+//! Entry 22. The encoder counts fewer ticks per turn than declared; 0 stands for as declared.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -16,7 +16,7 @@ impl EffectModel for EncoderCoarse {
         summary: "encoder quantization",
         stage: Stage::Sensor,
         bad_data: false,
-        parameters: &[Parameter::grid("actual_ticks_per_rev", "1", 0.0, (0.0, 100000.0))],
+        parameters: &[Parameter::grid("actual_ticks_per_rev", "1", 0.0, (0.0, 1e5))],
         channels: &[Channel::Encoders],
         equation: "angle rounded down to 2 pi / actual_ticks_per_rev",
         confounded_with: "noise",

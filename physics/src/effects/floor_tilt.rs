@@ -1,5 +1,5 @@
-//! 18. Gravity along a tilted floor pulls downhill; a velocity servo gives way by its time constant times
-//! the acceleration, so the wheels turn faster downhill and slower uphill.
+//! Entry 18. Gravity along a tilted floor pulls downhill; a velocity servo gives way by its time constant
+//! times the acceleration, so the wheels turn faster downhill and slower uphill.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -20,7 +20,7 @@ impl EffectModel for FloorTilt {
         stage: Stage::World,
         bad_data: false,
         parameters: &[
-            Parameter::smooth("slope_rad", "rad", (-0.2, 0.2), Relevance::Slope(0.0008)),
+            Parameter::smooth("slope_rad", "rad", (-0.2, 0.2), Relevance::Slope(8e-4)),
             Parameter::smooth("downhill_azimuth_rad", "rad", (-3.2, 3.2), Relevance::Unbounded),
         ],
         channels: &[Channel::Command, Channel::Encoders],

@@ -1,4 +1,4 @@
-//! 36. The position is older than its stamp.
+//! Entry 36. The position is older than its stamp.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

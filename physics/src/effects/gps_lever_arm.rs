@@ -1,4 +1,4 @@
-//! 35. The antenna sits elsewhere on the robot than declared.
+//! Entry 35. The antenna sits elsewhere on the robot than declared.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

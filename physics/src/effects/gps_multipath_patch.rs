@@ -1,4 +1,4 @@
-//! 37. In one place of the map reflections shift the position.
+//! Entry 37. In one place of the map reflections shift the position.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 27. The gyro reads a rate at rest.
+//! Entry 27. The gyro reads a rate at rest.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -17,7 +17,7 @@ impl EffectModel for GyroBias {
         summary: "gyro bias",
         stage: Stage::Sensor,
         bad_data: false,
-        parameters: &[Parameter::smooth("bias_rad_s", "rad/s", (-0.1, 0.1), Relevance::Size(0.0006))],
+        parameters: &[Parameter::smooth("bias_rad_s", "rad/s", (-0.1, 0.1), Relevance::Size(6e-4))],
         channels: &[Channel::Gyro],
         equation: "measured = w + bias_rad_s",
         confounded_with: "unequal_wheel_radii",

@@ -1,4 +1,4 @@
-//! 29. The bias of the gyro wanders: its increments are independent, with this density.
+//! Entry 29. The bias of the gyro wanders: its increments are independent, with this density.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -17,12 +17,7 @@ impl EffectModel for GyroRandomWalk {
         summary: "gyro random walk",
         stage: Stage::Sensor,
         bad_data: false,
-        parameters: &[Parameter::smooth(
-            "rad_s_sqrt_s",
-            "rad/s/sqrt(s)",
-            (0.0, 0.01),
-            Relevance::Size(0.00005),
-        )],
+        parameters: &[Parameter::smooth("rad_s_sqrt_s", "rad/s/sqrt(s)", (0.0, 0.01), Relevance::Size(5e-5))],
         channels: &[Channel::Gyro],
         equation: "db = rad_s_sqrt_s dW",
         confounded_with: "gyro_thermal_drift",

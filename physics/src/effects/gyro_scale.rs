@@ -1,4 +1,4 @@
-//! 28. The gyro reads a multiple of the rate.
+//! Entry 28. The gyro reads a multiple of the rate.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 30. While the gyro warms up its bias settles exponentially, like its temperature.
+//! Entry 30. While the gyro warms up its bias settles exponentially, like its temperature.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -18,8 +18,8 @@ impl EffectModel for GyroThermalDrift {
         stage: Stage::Sensor,
         bad_data: false,
         parameters: &[
-            Parameter::smooth("final_bias_rad_s", "rad/s", (-0.1, 0.1), Relevance::Size(0.0006)),
-            Parameter::smooth("time_constant_s", "s", (1.0, 5000.0), Relevance::Unbounded).off_at(60.0),
+            Parameter::smooth("final_bias_rad_s", "rad/s", (-0.1, 0.1), Relevance::Size(6e-4)),
+            Parameter::smooth("time_constant_s", "s", (1.0, 5e3), Relevance::Unbounded).off_at(60.0),
         ],
         channels: &[Channel::Gyro],
         equation: "b = final_bias_rad_s (1 - exp(-t / time_constant_s))",

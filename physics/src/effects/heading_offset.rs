@@ -1,4 +1,4 @@
-//! 58. The heading sensor's north is not the map's.
+//! Entry 58. The heading sensor's north is not the map's.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

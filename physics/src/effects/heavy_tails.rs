@@ -1,4 +1,4 @@
-//! 45. Range and bearing errors follow Student's t instead of a Gaussian, at the declared scale.
+//! Entry 45. Range and bearing errors follow Student's t instead of a Gaussian, at the declared scale.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

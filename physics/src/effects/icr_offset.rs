@@ -1,5 +1,5 @@
-//! 6. The body turns about a point that lies ahead of the axle midpoint by `offset_m`; the midpoint moves
-//! sideways in every turn.
+//! Entry 6. The body turns about a point that lies ahead of the axle midpoint by `offset_m`; the midpoint
+//! moves sideways in every turn.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 46. Now and then a sighting bears the name of another target in view.
+//! Entry 46. Now and then a sighting bears the name of another target in view.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 46. Two landmarks bear each other's number.
+//! Entry 46. Two landmarks bear each other's number.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -18,8 +18,8 @@ impl EffectModel for LandmarkIdentitySwap {
         stage: Stage::Identity,
         bad_data: true,
         parameters: &[
-            Parameter::choice("ids", (0.0, 100000.0)).component("first"),
-            Parameter::choice("ids", (0.0, 100000.0)).component("second"),
+            Parameter::choice("ids", (0.0, 1e5)).component("first"),
+            Parameter::choice("ids", (0.0, 1e5)).component("second"),
         ],
         channels: &[Channel::Relative],
         equation: "landmark ids[0] is reported as ids[1] and the reverse",

@@ -1,4 +1,4 @@
-//! 52. One landmark stands elsewhere than the map says.
+//! Entry 52. One landmark stands elsewhere than the map says.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -19,7 +19,7 @@ impl EffectModel for LandmarkSurveyError {
         stage: Stage::Sensor,
         bad_data: true,
         parameters: &[
-            Parameter::choice("id", (0.0, 100000.0)),
+            Parameter::choice("id", (0.0, 1e5)),
             Parameter::smooth("offset_m", "m", (-1.0, 1.0), Relevance::Size(0.01)).component("x"),
             Parameter::smooth("offset_m", "m", (-1.0, 1.0), Relevance::Size(0.01)).component("y"),
         ],

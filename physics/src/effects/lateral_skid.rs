@@ -1,4 +1,5 @@
-//! 5. Tyres creep sideways in proportion to the centripetal force: outwards, to the right in a left turn.
+//! Entry 5. Tyres creep sideways in proportion to the centripetal force: outwards, to the right in a left
+//! turn.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 33. In one place of the map the field points elsewhere: a cable, a steel beam.
+//! Entry 33. In one place of the map the field points elsewhere: a cable, a steel beam.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,5 +1,5 @@
-//! 4. A driven wheel creeps in proportion to the force it transmits, so to the acceleration. Over a window
-//! the loss is `slip_s` times the speed gained.
+//! Entry 4. A driven wheel creeps in proportion to the force it transmits, so to the acceleration. Over a
+//! window the loss is `slip_s` times the speed gained.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 19. The floor is slippery everywhere: wheels slip lengthwise and sideways.
+//! Entry 19. The floor is slippery everywhere: wheels slip lengthwise and sideways.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,5 +1,5 @@
-//! 19. In one place of the map the floor is slippery: wheels slip lengthwise and sideways there. Any other
-//! effect can be confined to a place by its scope.
+//! Entry 19. In one place of the map the floor is slippery: wheels slip lengthwise and sideways there. Any
+//! other effect can be confined to a place by its scope.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

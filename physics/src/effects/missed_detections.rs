@@ -1,5 +1,5 @@
-//! 47. Targets are missed more often far away and at the edge of the view: a logistic regression whose
-//! values add to the declared log-odds of a miss.
+//! Entry 47. Targets are missed more often far away and at the edge of the view: a logistic regression
+//! whose values add to the declared log-odds of a miss.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,5 +1,5 @@
-//! 48. The spread of bearings grows with the yaw rate; the value, an exposure time, adds to the declared
-//! standard deviation.
+//! Entry 48. The spread of bearings grows with the yaw rate; the value, an exposure time, adds to the
+//! declared standard deviation.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

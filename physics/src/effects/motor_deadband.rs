@@ -1,5 +1,5 @@
-//! 11. Small set-points move nothing: below `speed_m_s` the robot does not advance, below `wheel_rad_s` a
-//! wheel does not turn.
+//! Entry 11. Small set-points move nothing: below `speed_m_s` the robot does not advance, below
+//! `wheel_rad_s` a wheel does not turn.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

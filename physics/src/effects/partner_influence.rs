@@ -1,5 +1,5 @@
-//! 53. A robot that is near pushes this one away (wake, airflow, contact through a cable); the velocity
-//! dies out with the distance.
+//! Entry 53. A robot that is near pushes this one away (wake, airflow, contact through a cable); the
+//! velocity dies out with the distance.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,5 +1,5 @@
-//! 16. From an instant on a load presses the tyres flat, so that they roll less per turn, and makes the
-//! servo slower.
+//! Entry 16. From an instant on a load presses the tyres flat, so that they roll less per turn, and makes
+//! the servo slower.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -19,8 +19,8 @@ impl EffectModel for PayloadAdded {
         stage: Stage::Wheel,
         bad_data: false,
         parameters: &[
-            Parameter::grid("t_on_s", "s", 0.0, (0.0, 100000.0)),
-            Parameter::smooth("radius_relative", "1", (-0.05, 0.05), Relevance::Size(0.0008)),
+            Parameter::grid("t_on_s", "s", 0.0, (0.0, 1e5)),
+            Parameter::smooth("radius_relative", "1", (-0.05, 0.05), Relevance::Size(8e-4)),
             Parameter::smooth("lag_change_s", "s", (-0.02, 0.2), Relevance::LagChange(0.001)),
         ],
         channels: &[Channel::Command, Channel::Encoders, Channel::Truth],

@@ -1,4 +1,4 @@
-//! 16. A load beside the middle presses one tyre flatter than the other and moves the contact points.
+//! Entry 16. A load beside the middle presses one tyre flatter than the other and moves the contact points.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -18,7 +18,7 @@ impl EffectModel for PayloadOffset {
         stage: Stage::Wheel,
         bad_data: false,
         parameters: &[
-            Parameter::smooth("ratio", "1", (-0.05, 0.05), Relevance::Size(0.0015)),
+            Parameter::smooth("ratio", "1", (-0.05, 0.05), Relevance::Size(1.5e-3)),
             Parameter::smooth("track_relative", "1", (-0.2, 0.2), Relevance::Size(0.003)),
         ],
         channels: &[Channel::Encoders, Channel::Truth],

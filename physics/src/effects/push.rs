@@ -1,4 +1,4 @@
-//! 20. At one instant something moves the robot; no wheel notices.
+//! Entry 20. At one instant something moves the robot; no wheel notices.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -18,7 +18,7 @@ impl EffectModel for Push {
         stage: Stage::World,
         bad_data: false,
         parameters: &[
-            Parameter::grid("t_on_s", "s", 0.0, (0.0, 100000.0)),
+            Parameter::grid("t_on_s", "s", 0.0, (0.0, 1e5)),
             Parameter::smooth("jump", "m", (-10.0, 10.0), Relevance::Size(0.02)).component("x"),
             Parameter::smooth("jump", "m", (-10.0, 10.0), Relevance::Size(0.02)).component("y"),
             Parameter::smooth("jump", "rad", (-3.2, 3.2), Relevance::Size(0.02)).component("yaw"),

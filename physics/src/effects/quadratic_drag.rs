@@ -1,4 +1,5 @@
-//! 14. A load that grows with the square of the speed makes the servo droop, between command and encoder.
+//! Entry 14. A load that grows with the square of the speed makes the servo droop, between command and
+//! encoder.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 40. Ranges are too long by a constant.
+//! Entry 40. Ranges are too long by a constant.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 43. The spread of ranges grows with range; the values add to the declared standard deviation.
+//! Entry 43. The spread of ranges grows with range; the values add to the declared standard deviation.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 41. Ranges are too long in proportion.
+//! Entry 41. Ranges are too long in proportion.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 56. While the robot backs up, its wheels roll farther per turn.
+//! Entry 56. While the robot backs up, its wheels roll farther per turn.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

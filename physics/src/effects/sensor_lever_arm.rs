@@ -1,4 +1,4 @@
-//! 38. The range sensor sits elsewhere on the robot than declared.
+//! Entry 38. The range sensor sits elsewhere on the robot than declared.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

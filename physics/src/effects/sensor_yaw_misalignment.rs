@@ -1,4 +1,5 @@
-//! 39. The range sensor looks to the left of where it is declared to look; targets appear to the right.
+//! Entry 39. The range sensor looks to the left of where it is declared to look; targets appear to the
+//! right.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 14. Wheels lose distance in proportion to the square of the speed, between encoder and ground.
+//! Entry 14. Wheels lose distance in proportion to the square of the speed, between encoder and ground.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 13. No wheel turns faster than its motor can.
+//! Entry 13. No wheel turns faster than its motor can.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 25. The steered wheels stand at an angle when they are said to be straight.
+//! Entry 25. The steered wheels stand at an angle when they are said to be straight.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

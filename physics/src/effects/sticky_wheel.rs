@@ -1,5 +1,5 @@
-//! 12. From an instant on, dry friction in one wheel holds it back by a constant speed, whichever way it
-//! turns: what a velocity servo makes of a friction torque.
+//! Entry 12. From an instant on, dry friction in one wheel holds it back by a constant speed, whichever way
+//! it turns: what a velocity servo makes of a friction torque.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -20,7 +20,7 @@ impl EffectModel for StickyWheel {
         bad_data: false,
         parameters: &[
             Parameter::choice("wheel", (0.0, 1.0)),
-            Parameter::grid("t_on_s", "s", 0.0, (0.0, 100000.0)),
+            Parameter::grid("t_on_s", "s", 0.0, (0.0, 1e5)),
             Parameter::smooth("droop", "rad/s", (0.0, 5.0), Relevance::Size(0.01)),
         ],
         channels: &[Channel::Command, Channel::Encoders],

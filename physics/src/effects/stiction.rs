@@ -1,5 +1,5 @@
-//! 12. A wheel that rests stays at rest until its set-point exceeds the breakaway speed; once it moves,
-//! small set-points move it. A wheel slower than a tenth of the breakaway speed counts as resting.
+//! Entry 12. A wheel that rests stays at rest until its set-point exceeds the breakaway speed; once it
+//! moves, small set-points move it. A wheel slower than a tenth of the breakaway speed counts as resting.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 34. The sun sensor is mounted at an angle about the vertical.
+//! Entry 34. The sun sensor is mounted at an angle about the vertical.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

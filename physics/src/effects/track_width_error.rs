@@ -1,4 +1,4 @@
-//! 2. The wheels turn the body about contact points that are farther apart than believed: `E_b` of
+//! Entry 2. The wheels turn the body about contact points that are farther apart than believed: `E_b` of
 //! `borenstein1996`. Wheels that skid sideways in turns look the same (`goel1999`).
 
 use crate::context::Context;

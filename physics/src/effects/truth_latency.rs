@@ -1,4 +1,4 @@
-//! 51. The reference pose is older than its stamp.
+//! Entry 51. The reference pose is older than its stamp.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

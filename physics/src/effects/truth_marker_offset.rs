@@ -1,4 +1,5 @@
-//! 50. The reference system tracks a marker that is not on the axle midpoint or not aligned with the body.
+//! Entry 50. The reference system tracks a marker that is not on the axle midpoint or not aligned with the
+//! body.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

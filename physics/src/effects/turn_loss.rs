@@ -1,4 +1,4 @@
-//! 15. Scrubbing in turns costs distance in proportion to the yaw rate.
+//! Entry 15. Scrubbing in turns costs distance in proportion to the yaw rate.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

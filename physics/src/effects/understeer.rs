@@ -1,4 +1,4 @@
-//! 26. The faster a car, the wider its curve at one steering angle: the characteristic speed is
+//! Entry 26. The faster a car, the wider its curve at one steering angle: the characteristic speed is
 //! `1/sqrt(K)`.
 
 use crate::context::Context;

@@ -1,5 +1,6 @@
-//! 1. The left wheel rolls farther per turn than the right: `E_d` of `borenstein1996`, here about the mean,
-//! so that the mean radius stays nominal. In place, the turned angle is unchanged and the centre shifts.
+//! Entry 1. The left wheel rolls farther per turn than the right: `E_d` of `borenstein1996`, here about the
+//! mean, so that the mean radius stays nominal. In place, the turned angle is unchanged and the centre
+//! shifts.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -18,7 +19,7 @@ impl EffectModel for UnequalWheelRadii {
         summary: "unequal wheel diameters",
         stage: Stage::Wheel,
         bad_data: false,
-        parameters: &[Parameter::smooth("ratio", "1", (-0.05, 0.05), Relevance::Size(0.0015))],
+        parameters: &[Parameter::smooth("ratio", "1", (-0.05, 0.05), Relevance::Size(1.5e-3))],
         channels: &[Channel::Encoders, Channel::Truth],
         equation: "r_left = r (1 + ratio/2), r_right = r (1 - ratio/2); dw = -ratio v / b",
         confounded_with: "gyro bias at one speed; steer trim",

@@ -1,4 +1,4 @@
-//! 24. A wheel's axle is off its centre: the rolling radius varies with the wheel's angle.
+//! Entry 24. A wheel's axle is off its centre: the rolling radius varies with the wheel's angle.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -19,7 +19,7 @@ impl EffectModel for WheelEccentricity {
         bad_data: false,
         parameters: &[
             Parameter::choice("wheel", (0.0, 1.0)),
-            Parameter::smooth("offset_m", "m", (-0.01, 0.01), Relevance::Size(0.0003)),
+            Parameter::smooth("offset_m", "m", (-0.01, 0.01), Relevance::Size(3e-4)),
             Parameter::smooth("phase_rad", "rad", (-3.2, 3.2), Relevance::Unbounded),
         ],
         channels: &[Channel::Encoders, Channel::Truth],

@@ -1,4 +1,4 @@
-//! 3. Both wheels roll farther per turn than believed: `E_s` of `borenstein1996`.
+//! Entry 3. Both wheels roll farther per turn than believed: `E_s` of `borenstein1996`.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 21. The medium carries the robot with it, whatever its drive does.
+//! Entry 21. The medium carries the robot with it, whatever its drive does.
 
 use crate::context::Context;
 use crate::effect::EffectModel;

@@ -1,4 +1,4 @@
-//! 21. A force fixed in the map makes a velocity servo give way; the same droop as a slope. Equal
+//! Entry 21. A force fixed in the map makes a velocity servo give way; the same droop as a slope. Equal
 //! acceleration on robots of different mass favours a slope.
 
 use crate::context::Context;
@@ -19,7 +19,7 @@ impl EffectModel for WorldForce {
         stage: Stage::World,
         bad_data: false,
         parameters: &[
-            Parameter::smooth("droop_m_s", "m/s", (-0.2, 0.2), Relevance::Size(0.0008)),
+            Parameter::smooth("droop_m_s", "m/s", (-0.2, 0.2), Relevance::Size(8e-4)),
             Parameter::smooth("azimuth_rad", "rad", (-3.2, 3.2), Relevance::Unbounded),
         ],
         channels: &[Channel::Command, Channel::Encoders],

@@ -26,7 +26,7 @@ pub fn wheel_turns<S: Scalar>(
     window: &CommandWindow,
     state: &mut ActuatorState<S>,
 ) -> [S; 2] {
-    let middle_s = 0.5 * (window.from_s + window.to_s);
+    let middle_s = f64::midpoint(window.from_s, window.to_s);
     let context = Context {
         surroundings: window.surroundings,
         ..Context::new(&model.nominal, middle_s, window.motion.lift())
