@@ -31,13 +31,13 @@ pub fn clock_error_s<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> 
     stamp(model, context) - context.time_s
 }
 
-/// Wheel angles as read, radians: the last tick passed. The derivative of a count is zero.
+/// Wheel angles as read, radians: the last tick passed. A count itself has no derivative.
 pub fn encoders<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> [S; 2] {
     let reading = encoder_reading(model, context);
-    let ticks = reading.ticks_per_rev.value();
+    let ticks = reading.ticks_per_rev;
     if ticks > 0.0 {
-        let tick_rad = TAU / ticks;
-        reading.angle_rad.map(|angle| S::constant(libm::floor(angle.value() / tick_rad) * tick_rad))
+        let tick_rad = S::constant(TAU) / ticks;
+        reading.angle_rad.map(|angle| tick_rad * libm::floor((angle / tick_rad).value()))
     } else {
         reading.angle_rad
     }

@@ -1,5 +1,7 @@
 //! One short recording's worth of every prediction, for tests over the whole catalogue.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests, outside a test function")]
+
 use pleiad_physics::chain::actuator::{ActuatorState, Command, schedule};
 use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::chain::robot::Robot;
@@ -19,7 +21,8 @@ pub fn nominal() -> Nominal<f64> {
     let mut nominal = Nominal::ideal(0.05, 0.3);
     nominal.encoder_ticks_per_rev = 1024.0;
     (nominal.servo_time_constant_s, nominal.servo_time_constant_turn_s) = (0.06, 0.04);
-    nominal.command_latency_s = 0.01;
+    // Odd, so that commands do not take effect on the edge of a window.
+    nominal.command_latency_s = 0.0113;
     (nominal.gyro_bias_rad_s, nominal.gyro_scale) = (0.001, 1.01);
     (nominal.gps_mount_x_m, nominal.gps_mount_y_m, nominal.gps_latency_s) = (0.1, 0.02, 0.05);
     (nominal.clock_offset_s, nominal.clock_drift_ppm) = (0.004, 20.0);
