@@ -1,11 +1,17 @@
 //! The motion of the body, predicted from encoders.
 
+use crate::chain::actuator::Scheduled;
 use crate::chain::body::{BodyState, advance};
+use crate::chain::robot::Robot;
 use crate::chain::sensors;
 use crate::context::{Context, Motion, Surroundings};
 use crate::model::RobotModel;
 use crate::pose::Pose;
+use crate::predict::actuator::CommandWindow;
 use crate::scalar::Scalar;
+
+/// The longest step in which a state-dependent effect is taken from the beginning of the step, seconds.
+const COMMANDED_STEP_S: f64 = 0.02;
 
 /// A sample of the wheels' cumulative angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,14 +105,42 @@ pub fn truth_change<S: Scalar>(
     state: &mut BodyState<S>,
 ) -> Pose<S> {
     let rollout = roll_out(model, window, state);
-    let seen = |motion: Motion<S>, time_s: f64| {
-        let context = Context::new(&model.nominal, time_s, motion);
-        let reading = sensors::truth_reading(model, &context);
-        let ahead_s = sensors::clock_error_s(model, &context) - reading.latency_s;
-        motion.carried(ahead_s).compose(&sensors::marker(&reading))
-    };
-    let times = [window.samples.first(), window.samples.last()].map(|s| s.map_or(0.0, |s| s.time_s));
-    seen(rollout.first, times[0]).between(&seen(rollout.last, times[1]))
+    let [first_s, last_s] =
+        [window.samples.first(), window.samples.last()].map(|sample| sample.map_or(0.0, |own| own.time_s));
+    seen_by_truth(model, rollout.first, first_s).between(&seen_by_truth(model, rollout.last, last_s))
+}
+
+/// The reference pose whose stamp equals the robot's stamp `time_s` of this motion.
+fn seen_by_truth<S: Scalar>(model: &RobotModel<S>, motion: Motion<S>, time_s: f64) -> Pose<S> {
+    let context = Context::new(&model.nominal, time_s, motion);
+    let reading = sensors::truth_reading(model, &context);
+    let ahead_s = sensors::clock_error_s(model, &context) - reading.latency_s;
+    motion.carried(ahead_s).compose(&sensors::marker(&reading))
+}
+
+/// The motion that the reference system sees over a window that is driven by commands alone, for
+/// recordings without encoders. `robot` keeps servo and body from window to window; it is put to the
+/// window's beginning and driven in steps of about 20 ms.
+pub fn commanded_truth_change<S: Scalar>(
+    model: &RobotModel<S>,
+    scheduled: &[Scheduled<S>],
+    window: &CommandWindow,
+    robot: &mut Robot<S>,
+) -> Pose<S> {
+    let start = window.motion.lift();
+    robot.time_s = window.from_s;
+    robot.motion.pose = start.pose;
+    robot.motion.speed_m_s = robot.actuator.speed_m_s;
+    robot.motion.yaw_rate_rad_s = robot.actuator.yaw_rate_rad_s;
+    let first = seen_by_truth(model, robot.motion, window.from_s);
+    let duration_s = window.to_s - window.from_s;
+    let steps = libm::ceil(duration_s / COMMANDED_STEP_S).max(1.0);
+    // The cast saturates: a window is never that long.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    for _ in 0..steps as u32 {
+        robot.drive(model, scheduled, window.surroundings, duration_s / steps);
+    }
+    first.between(&seen_by_truth(model, robot.motion, window.to_s))
 }
 
 /// The mean yaw rate that the gyro reads over the window, rad/s.
@@ -124,7 +158,8 @@ pub fn mean_gyro<S: Scalar>(model: &RobotModel<S>, window: &BodyWindow<'_>, stat
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Drive, Nominal, NominalParameter, Variable};
+    use crate::chain::actuator::{Command, schedule};
+    use crate::{Chance, Drive, Nominal, NominalParameter, Variable};
 
     fn circle() -> [EncoderSample; 11] {
         // Radius 0.05 m, track 0.3 m: 0.5 m/s and 1 rad/s.
@@ -151,6 +186,19 @@ mod tests {
         assert!((change.y_m - 0.5 * (1.0 - 1.0_f64.cos())).abs() < 1e-12);
         assert!((change.yaw_rad - 1.0).abs() < 1e-12);
         assert!((mean_gyro(&model(), &window, &mut BodyState::default()) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn without_encoders_a_command_makes_the_same_arc() {
+        let model = model();
+        let command = Command { time_s: 0.0, speed_m_s: 0.5, yaw_rate_rad_s: 1.0 };
+        let scheduled = schedule(&model, &[command], |_| Chance::EXPECTED);
+        let motion = Motion::at_rest(Pose::new(3.0, 1.0, 2.0));
+        let window = CommandWindow { from_s: 0.5, to_s: 1.5, motion, surroundings: Surroundings::default() };
+        let mut robot = Robot::at_rest(Pose::identity());
+        let change = commanded_truth_change(&model, &scheduled, &window, &mut robot);
+        assert!((change.x_m - 0.5 * 1.0_f64.sin()).abs() < 1e-12, "{change:?}");
+        assert!((change.yaw_rad - 1.0).abs() < 1e-12);
     }
 
     #[test]

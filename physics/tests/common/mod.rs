@@ -7,8 +7,8 @@ use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::chain::robot::Robot;
 use pleiad_physics::chain::sensors::{self, Seen};
 use pleiad_physics::predict::{
-    BodyWindow, CommandWindow, EncoderSample, Instant, body_motion, gps, heading, mean_gyro, sighting, truth,
-    truth_change, wheel_turns,
+    BodyWindow, CommandWindow, EncoderSample, Instant, body_motion, commanded_truth_change, gps, heading,
+    mean_gyro, sighting, truth, truth_change, wheel_turns,
 };
 use pleiad_physics::signal::Target;
 use pleiad_physics::{Chance, Context, Drive, Motion, Nominal, Pose, RobotModel, Scalar, Surroundings};
@@ -116,6 +116,7 @@ fn push_pose<S: Scalar>(out: &mut Vec<Named<S>>, name: &str, pose: Pose<S>) {
 fn actuator<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
     let scheduled = schedule(model, &commands(), chance);
     let mut state = ActuatorState::default();
+    let mut robot = Robot::at_rest(Pose::identity());
     for from_s in instants(17, 0.2) {
         let middle_s = from_s + 0.1;
         let window = CommandWindow {
@@ -127,6 +128,8 @@ fn actuator<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
         let [left, right] = wheel_turns(model, &scheduled, &window, &mut state);
         out.push((format!("turn left {from_s:.2}"), left));
         out.push((format!("turn right {from_s:.2}"), right));
+        let driven = commanded_truth_change(model, &scheduled, &window, &mut robot);
+        push_pose(out, &format!("commanded {from_s:.2}"), driven);
     }
 }
 
