@@ -1,0 +1,176 @@
+//! From turning wheels to a pose in the map.
+
+use crate::context::Context;
+use crate::model::{Drive, RobotModel};
+use crate::pose::Pose;
+use crate::scalar::Scalar;
+use crate::signal::{BodyMotion, Castor, Geometry, MapMotion, Rolling};
+
+/// What the body remembers from step to step.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyState<S> {
+    /// Speed of the step before, m/s: its change is the acceleration. `None` at the start.
+    pub speed_m_s: Option<S>,
+    /// What a swinging castor remembers.
+    pub castor: Castor<S>,
+}
+
+impl<S: Scalar> Default for BodyState<S> {
+    fn default() -> Self {
+        Self { speed_m_s: None, castor: Castor { direction: 0, since_reversal_m: None } }
+    }
+}
+
+/// The outcome of a step of the body.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyStep<S> {
+    /// `map_from_robot` at the end.
+    pub pose: Pose<S>,
+    /// Mean forward speed, m/s.
+    pub speed_m_s: S,
+    /// Mean yaw rate, rad/s.
+    pub yaw_rate_rad_s: S,
+    /// Change of speed from the step before, m/s^2.
+    pub acceleration_m_s2: S,
+}
+
+/// Moves the body by the angles that its wheels turn in the context's step, which must be longer than 0.
+///
+/// Velocities for the hooks come from the turned angles themselves; the context gives the pose at the
+/// beginning and the wheels' angles.
+pub fn advance<S: Scalar>(
+    model: &RobotModel<S>,
+    context: &Context<S>,
+    turned_rad: [S; 2],
+    state: &mut BodyState<S>,
+) -> BodyStep<S> {
+    let step_s = context.step_s;
+    let geometry = geometry(model, context);
+    let [left, right] = geometry.wheel_radius_m;
+    let rolled_m = [left * turned_rad[0], right * turned_rad[1]];
+    let (forward, yaw) = kinematics(model.drive, context, &geometry, rolled_m);
+
+    let mut context = *context;
+    let speed = forward / step_s;
+    context.motion.speed_m_s = speed;
+    context.motion.yaw_rate_rad_s = yaw / step_s;
+    context.motion.acceleration_m_s2 = state.speed_m_s.map_or(S::zero(), |before| (speed - before) / step_s);
+
+    let mut rolling = Rolling { turned_rad, rolled_m };
+    model.apply(&context, |effect, values| effect.rolling(values, &context, &mut rolling));
+    let (forward_m, yaw_rad) = kinematics(model.drive, &context, &geometry, rolling.rolled_m);
+    turn_castor(&mut state.castor, forward_m);
+    let mut body = BodyMotion { forward_m, left_m: S::zero(), yaw_rad, castor: state.castor };
+    model.apply(&context, |effect, values| effect.body(values, &context, &mut body));
+    if let Some(since) = &mut state.castor.since_reversal_m {
+        *since += forward_m.abs();
+    }
+
+    let mut pose = context.motion.pose.compose(&Pose::exp(body.forward_m, body.left_m, body.yaw_rad));
+    let mut added = MapMotion { shift_m: [S::zero(); 2], yaw_rad: S::zero() };
+    model.apply(&context, |effect, values| effect.world(values, &context, &mut added));
+    pose.x_m += added.shift_m[0];
+    pose.y_m += added.shift_m[1];
+    pose.yaw_rad += added.yaw_rad;
+
+    state.speed_m_s = Some(speed);
+    BodyStep {
+        pose,
+        speed_m_s: body.forward_m / step_s,
+        yaw_rate_rad_s: (body.yaw_rad + added.yaw_rad) / step_s,
+        acceleration_m_s2: context.motion.acceleration_m_s2,
+    }
+}
+
+/// The robot as its wheels see it.
+fn geometry<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> Geometry<S> {
+    let nominal = &model.nominal;
+    let mut geometry = Geometry {
+        wheel_radius_m: [nominal.wheel_radius; 2],
+        track_width_m: match model.drive {
+            Drive::SkidSteer { track_ratio } => nominal.track_width * track_ratio,
+            Drive::Differential | Drive::CarLike { .. } => nominal.track_width,
+        },
+        steer_offset_rad: S::zero(),
+        understeer_s2_per_m2: S::zero(),
+    };
+    model.apply(context, |effect, values| effect.geometry(values, context, &mut geometry));
+    geometry
+}
+
+/// Forward distance and yaw: `(left + right)/2`, and `(right - left)/b`, or for a car the distance times
+/// `tan(steer) / (L (1 + K v^2))`.
+fn kinematics<S: Scalar>(
+    drive: Drive,
+    context: &Context<S>,
+    geometry: &Geometry<S>,
+    [left, right]: [S; 2],
+) -> (S, S) {
+    let forward = (left + right) * 0.5;
+    let yaw = match drive {
+        Drive::Differential | Drive::SkidSteer { .. } => (right - left) / geometry.track_width_m,
+        Drive::CarLike { wheelbase_m } => {
+            let steer = geometry.steer_offset_rad + context.surroundings.steer_rad;
+            let speed = forward / context.step_s;
+            let widened = geometry.understeer_s2_per_m2 * speed.square() + 1.0;
+            forward * steer.tan() / (widened * wheelbase_m)
+        }
+    };
+    (forward, yaw)
+}
+
+/// Notes a reversal; the castor begins to swing round in the step that reverses.
+fn turn_castor<S: Scalar>(castor: &mut Castor<S>, forward_m: S) {
+    let direction = match forward_m.value() {
+        forward if forward > 0.0 => 1,
+        forward if forward < 0.0 => -1,
+        _ => return,
+    };
+    if castor.direction == -direction {
+        castor.since_reversal_m = Some(S::zero());
+    }
+    castor.direction = direction;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Motion, Nominal};
+
+    fn moved(drive: Drive, steer_rad: f64, turned: [f64; 2]) -> BodyStep<f64> {
+        let model = RobotModel::nominal(drive, Nominal::ideal(0.1, 0.5));
+        let mut context = Context::new(&model.nominal, 0.0, Motion::at_rest(Pose::identity())).over(2.0);
+        context.surroundings.steer_rad = steer_rad;
+        advance(&model, &context, turned, &mut BodyState::default())
+    }
+
+    #[test]
+    fn opposite_wheels_spin_in_place() {
+        let step = moved(Drive::Differential, 0.0, [-5.0, 5.0]);
+        assert!((step.pose.yaw_rad - 2.0).abs() < 1e-15 && step.pose.x_m.abs() < 1e-15);
+        assert!((step.yaw_rate_rad_s - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_skid_steered_robot_turns_less_by_its_track_ratio() {
+        let step = moved(Drive::SkidSteer { track_ratio: 1.6 }, 0.0, [-5.0, 5.0]);
+        assert!((step.pose.yaw_rad - 2.0 / 1.6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_car_drives_the_circle_of_its_steering_angle() {
+        // Ackermann: radius = wheelbase / tan(steer) = 0.8 m; rolled 1 m.
+        let step = moved(Drive::CarLike { wheelbase_m: 0.8 }, std::f64::consts::FRAC_PI_4, [10.0, 10.0]);
+        assert!((step.pose.yaw_rad - 1.0 / 0.8).abs() < 1e-15);
+        assert!((step.pose.x_m - 0.8 * 1.25_f64.sin()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_castor_begins_to_swing_at_a_reversal_only() {
+        let mut castor = Castor { direction: 0, since_reversal_m: None };
+        for (forward, reversed) in [(0.1, false), (0.0, false), (0.2, false), (-0.1, true)] {
+            turn_castor(&mut castor, forward);
+            assert_eq!(castor.since_reversal_m.is_some(), reversed);
+        }
+    }
+}

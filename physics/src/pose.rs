@@ -1,0 +1,119 @@
+//! Planar poses over a [`Scalar`]: what `estimation::geometry::Pose2` is, with derivatives.
+
+use crate::scalar::Scalar;
+
+/// Below this angle the quotients come from their series; the first neglected term is below 1e-17.
+const SMALL_ANGLE_RAD: f64 = 1e-4;
+
+/// A pose or a rigid motion of SE(2): metres, metres, radians. The yaw is not wrapped, so that it can be
+/// differentiated and differenced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose<S> {
+    /// Along x, metres.
+    pub x_m: S,
+    /// Along y, metres.
+    pub y_m: S,
+    /// Counter-clockwise from x, radians.
+    pub yaw_rad: S,
+}
+
+impl<S: Scalar> Pose<S> {
+    /// A pose from position and yaw.
+    pub fn new(x_m: S, y_m: S, yaw_rad: S) -> Self {
+        Self { x_m, y_m, yaw_rad }
+    }
+
+    /// A pose that depends on no parameter.
+    pub fn constant(x_m: f64, y_m: f64, yaw_rad: f64) -> Self {
+        Self::new(S::constant(x_m), S::constant(y_m), S::constant(yaw_rad))
+    }
+
+    /// The neutral element.
+    pub fn identity() -> Self {
+        Self::constant(0.0, 0.0, 0.0)
+    }
+
+    /// The position, metres.
+    pub fn position(&self) -> [S; 2] {
+        [self.x_m, self.y_m]
+    }
+
+    /// `R v`: a vector of this frame in the outer frame.
+    pub fn rotate(&self, [x, y]: [S; 2]) -> [S; 2] {
+        let (sin, cos) = (self.yaw_rad.sin(), self.yaw_rad.cos());
+        [cos * x - sin * y, sin * x + cos * y]
+    }
+
+    /// `R' v`: a vector of the outer frame in this frame.
+    pub fn rotate_back(&self, [x, y]: [S; 2]) -> [S; 2] {
+        let (sin, cos) = (self.yaw_rad.sin(), self.yaw_rad.cos());
+        [cos * x + sin * y, cos * y - sin * x]
+    }
+
+    /// The group product: `a_from_b.compose(b_from_c)` is `a_from_c`.
+    pub fn compose(&self, other: &Self) -> Self {
+        let [x, y] = self.rotate(other.position());
+        Self::new(self.x_m + x, self.y_m + y, self.yaw_rad + other.yaw_rad)
+    }
+
+    /// `self^-1 other`: the other pose seen from this one.
+    pub fn between(&self, other: &Self) -> Self {
+        let [x, y] = self.rotate_back([other.x_m - self.x_m, other.y_m - self.y_m]);
+        Self::new(x, y, other.yaw_rad - self.yaw_rad)
+    }
+
+    /// A point of the outer frame seen from this pose.
+    pub fn point_seen(&self, [x, y]: [S; 2]) -> [S; 2] {
+        self.rotate_back([x - self.x_m, y - self.y_m])
+    }
+
+    /// The exponential map: the motion along a constant body velocity whose integral is
+    /// `(forward, left, yaw)` (`sola2018micro`, eqs. 156 and 158).
+    pub fn exp(forward_m: S, left_m: S, yaw_rad: S) -> Self {
+        let (a, b) = if yaw_rad.value().abs() < SMALL_ANGLE_RAD {
+            let square = yaw_rad * yaw_rad;
+            (S::one() - square / 6.0, yaw_rad * (S::constant(0.5) - square / 24.0))
+        } else {
+            let half = (yaw_rad * 0.5).sin();
+            (yaw_rad.sin() / yaw_rad, half * half * 2.0 / yaw_rad)
+        };
+        Self::new(a * forward_m - b * left_m, b * forward_m + a * left_m, yaw_rad)
+    }
+
+    /// The values without their derivatives.
+    pub fn value(&self) -> Pose<f64> {
+        Pose::new(self.x_m.value(), self.y_m.value(), self.yaw_rad.value())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that are exact by construction")]
+mod tests {
+    use super::*;
+    use crate::Dual;
+
+    #[test]
+    fn a_quarter_circle_ends_where_geometry_says() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let end = Pose::exp(quarter * 2.0, 0.0, quarter);
+        assert!((end.x_m - 2.0).abs() < 1e-15 && (end.y_m - 2.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_pose_seen_from_itself_is_the_identity() {
+        let pose = Pose::new(1.0, -2.0, 0.7);
+        assert_eq!(pose.between(&pose), Pose::identity());
+        let back = pose.compose(&pose.between(&Pose::identity()));
+        assert!(back.x_m.abs() < 1e-15 && back.y_m.abs() < 1e-15 && back.yaw_rad.abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_exponential_is_smooth_across_the_switch_to_its_series() {
+        let at = |angle| Pose::exp(Dual::<1>::constant(1.0), Dual::constant(0.5), Dual::variable(angle, 0));
+        let (below, above) = (at(0.999_999e-4), at(1.000_001e-4));
+        for (lower, upper) in [(below.x_m, above.x_m), (below.y_m, above.y_m)] {
+            assert!((lower.value() - upper.value()).abs() < 1e-9);
+            assert!((lower.derivatives()[0] - upper.derivatives()[0]).abs() < 1e-8);
+        }
+    }
+}

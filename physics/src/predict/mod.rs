@@ -1,0 +1,12 @@
+//! What a model predicts for one window or instant of a recording, from the measured upstream channel.
+//!
+//! The residual of a stage is the measured downstream channel minus these. With
+//! [`RobotModel::differentiated`](crate::RobotModel::differentiated) every prediction carries its derivatives.
+
+mod actuator;
+mod body;
+mod sensors;
+
+pub use actuator::{CommandWindow, wheel_turns};
+pub use body::{BodyWindow, EncoderSample, body_motion, commanded_truth_change, mean_gyro, truth_change};
+pub use sensors::{Instant, gps, heading, sighting, truth};
