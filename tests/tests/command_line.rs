@@ -35,6 +35,7 @@ height_m = 10.0
 
 [defaults.relative]
 rate_hz = 2.0
+see = "both"
 
 [[robots]]
 id = 1
