@@ -15,6 +15,7 @@ verify:
 fix:
     cargo clippy --workspace --all-targets --fix --allow-dirty --allow-staged
     cargo fmt --all
+    rustfmt --edition 2024 physics/src/effects/*.rs
 
 # All tests that need nothing beyond the repository.
 test:

@@ -24,6 +24,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// What a scenario or a recording lets the team know of itself.
     Observability(ObservabilityArgs),
+    /// The physics a simulation can leave out: names, parameters, equations.
+    Effects(EffectsArgs),
     /// One robot's agent.
     Agent(AgentArgs),
     /// Launch and watch the agents of a configuration.
@@ -144,6 +146,15 @@ pub struct ObservabilityArgs {
     /// Only this many seconds from the start.
     #[arg(long)]
     pub seconds: Option<f64>,
+    /// One JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct EffectsArgs {
+    /// Only this effect, with its parameters and what it is confounded with.
+    pub name: Option<String>,
     /// One JSON object on stdout.
     #[arg(long)]
     pub json: bool,

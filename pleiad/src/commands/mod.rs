@@ -3,6 +3,7 @@
 mod agent;
 mod coordinator;
 mod demo;
+mod effects;
 mod observability;
 mod replay;
 mod run;
@@ -19,6 +20,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Run(args) => run::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Observability(args) => observability::run(&args),
+        Command::Effects(args) => effects::run(&args),
         Command::Agent(args) => agent::run(&args),
         Command::Coordinator(args) => coordinator::run(&args),
         Command::SimPeers(args) => sim_peers::run(&args),
