@@ -2,6 +2,7 @@
 //! says, and what is left in folders.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
+#![allow(clippy::float_cmp, reason = "counts, which JSON knows as numbers")]
 
 #[path = "command_line/demo.rs"]
 mod demo;
@@ -35,6 +36,7 @@ height_m = 10.0
 
 [defaults.relative]
 rate_hz = 2.0
+see = "both"
 
 [[robots]]
 id = 1
