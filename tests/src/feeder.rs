@@ -1,6 +1,6 @@
 //! A feed of samples into running agents that can be held at any instant of team time.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::missing_panics_doc, reason = "helpers of tests")]
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

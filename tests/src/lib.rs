@@ -2,5 +2,6 @@
 
 pub mod architecture;
 pub mod feeder;
+pub mod folded;
 pub mod program;
 pub mod stage;

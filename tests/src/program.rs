@@ -1,6 +1,6 @@
 //! The `pleiad` program, built once per test process and run as people and scripts run it.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::missing_panics_doc, reason = "helpers of tests")]
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

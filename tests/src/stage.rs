@@ -1,6 +1,6 @@
 //! A simulated team whose agents are processes on this machine.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "helpers of tests")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::missing_panics_doc, reason = "helpers of tests")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -18,21 +18,21 @@ use pleiad_agent::journal::Journal;
 use pleiad_agent::{Record, driver};
 use pleiad_bus::{Bus, ZenohBus, ZenohConfig};
 use pleiad_coordinator::{AgentEntry, Backoff, CoordinatorConfig, Restart, differences, endpoints};
-use pleiad_estimation::fact::{Entry, LogId};
-use pleiad_estimation::fold::FoldConfig;
-use pleiad_estimation::ledger::{Insertion, Ledger};
+use pleiad_estimation::fact::Entry;
+use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::sample::Sample;
-use pleiad_estimation::{BootIndex, Pose2, RobotId};
+use pleiad_estimation::{Pose2, RobotId};
 use pleiad_protocol::keys::{self, Kind};
 use pleiad_protocol::{ControlReply, ControlRequest, Message, Status, TeamName};
 use pleiad_sim_peers::{Fleet, FleetOptions, Prior, Scenario, SimulatedRun, simulate};
 use tempfile::TempDir;
 use tokio::time::Instant;
 
+use crate::folded::fold;
 use crate::program;
 
 /// Far beyond what anything here takes; reached only by failure.
-pub const PATIENCE: Duration = Duration::from_secs(60);
+pub const PATIENCE: Duration = Duration::from_mins(1);
 /// Between two looks.
 const LOOK: Duration = Duration::from_millis(50);
 /// An agent that is there answers within this.
@@ -383,24 +383,6 @@ impl Drop for Stage {
         let pids = self.processes().into_iter().map(|pid| pid.to_string());
         let _ = Command::new("kill").arg("-KILL").args(pids).stderr(Stdio::null()).status();
     }
-}
-
-/// Entries folded from nothing, in the order given.
-pub fn fold(entries: impl IntoIterator<Item = Entry>) -> Ledger {
-    let mut ledger = Ledger::new(FoldConfig::default());
-    for entry in entries {
-        let id = entry.id;
-        let insertion = ledger.insert(entry);
-        let good = matches!(insertion, Insertion::Added { .. } | Insertion::Duplicate | Insertion::Waiting);
-        assert!(good, "{id}: {insertion:?}");
-    }
-    ledger.settle();
-    ledger
-}
-
-/// The log of a robot's boot.
-pub fn log(robot: RobotId, boot: u32) -> LogId {
-    LogId { robot, boot: BootIndex(boot) }
 }
 
 fn prior_section(prior: &Prior) -> PriorSection {

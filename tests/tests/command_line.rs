@@ -2,6 +2,7 @@
 //! says, and what is left in folders.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
+#![allow(clippy::float_cmp, reason = "counts, which JSON knows as numbers")]
 
 #[path = "command_line/demo.rs"]
 mod demo;

@@ -19,7 +19,7 @@ mod restarted;
 use pleiad_estimation::RobotId;
 use pleiad_estimation::fact::{Body, Boot};
 use pleiad_estimation::ledger::Ledger;
-use pleiad_tests::stage::log;
+use pleiad_tests::folded::log;
 
 const ONE: RobotId = RobotId(1);
 const TWO: RobotId = RobotId(2);

@@ -60,8 +60,9 @@ fn a_replay_takes_fixes_from_ground_truth_and_leaves_out_landmarks() {
     let one = absolute("one", &["--landmarks", "6"]);
     let none = absolute("none", &["--landmarks", "none"]);
     assert!(all > one && one > none, "{all}, {one}, {none}");
-    // Fixes for robot 2 at 2 Hz over 20 s, the first after half a second.
-    assert_eq!(absolute("fixed", &["--landmarks", "none", "--absolute", "2@2.0:0.3"]), none + 40.0);
+    // Fixes for robot 2 at 2 Hz over 20 s; its odometry may end just before the last of them.
+    let fixes = absolute("fixed", &["--landmarks", "none", "--absolute", "2@2.0:0.3"]) - none;
+    assert!((39.0..=40.0).contains(&fixes), "{fixes}");
 }
 
 #[test]

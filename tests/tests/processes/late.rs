@@ -5,7 +5,8 @@ use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::sample::Reading;
 use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_tests::feeder::Feeder;
-use pleiad_tests::stage::{Stage, fold};
+use pleiad_tests::folded::fold;
+use pleiad_tests::stage::Stage;
 
 use crate::{ONE, THREE, TWO, boot, boots};
 
