@@ -2,6 +2,7 @@
 //! `cargo test -p pleiad-tests --features slow --test monte_carlo -- --nocapture`.
 
 #![cfg(feature = "slow")]
+#![allow(clippy::expect_used, reason = "helpers of tests fail by panicking")]
 #![allow(clippy::print_stdout, reason = "the table is what the benchmark page quotes")]
 
 use pleiad_estimation::Timestamp;
