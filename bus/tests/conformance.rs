@@ -3,6 +3,8 @@
 //! Zenoh needs a moment until a declaration has reached the other session, so a test first probes, again
 //! and again, until one probe has come through; from then on it waits for what must arrive.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed expectation is a failed test")]
+
 use std::future::Future;
 use std::time::Duration;
 

@@ -198,7 +198,7 @@ impl Supervisor {
                 tracing::info!(robot = robot.0, "agent has left");
             }
             TeamEvent::AgentDown { robot } => {
-                tracing::warn!(robot = robot.0, "agent is down or out of reach")
+                tracing::warn!(robot = robot.0, "agent is down or out of reach");
             }
             TeamEvent::Exited { robot, exit } if exit.failed() => {
                 tracing::warn!(robot = robot.0, %exit, "the agent's process ended");

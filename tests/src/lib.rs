@@ -5,3 +5,4 @@ pub mod feeder;
 pub mod folded;
 pub mod program;
 pub mod stage;
+pub mod team;
