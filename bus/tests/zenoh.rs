@@ -1,6 +1,11 @@
 //! What only the bus over zenoh does: links, listeners and their loss.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed expectation is a failed test")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a failed expectation is a failed test"
+)]
 
 use std::io::{ErrorKind, Read};
 use std::net::TcpListener;
