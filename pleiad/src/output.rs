@@ -1,23 +1,26 @@
 //! What people and scripts see: text or one JSON object on stdout, everything else on stderr.
 
+use std::io::Write;
+
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 /// Prints lines for people, or the object for scripts.
-#[allow(clippy::print_stdout, reason = "the one place that writes to stdout")]
 pub fn print(json: bool, object: &impl Serialize, text: &str) -> anyhow::Result<()> {
     if json {
-        println!("{}", serde_json::to_string_pretty(object)?);
+        raw(&format!("{}\n", serde_json::to_string_pretty(object)?))
     } else {
-        println!("{}", text.trim_end());
+        raw(&format!("{}\n", text.trim_end()))
     }
-    Ok(())
 }
 
-/// Prints text as it is.
-#[allow(clippy::print_stdout, reason = "the one place that writes to stdout")]
-pub fn raw(text: &str) {
-    print!("{text}");
+/// Prints text as it is. Whoever reads it may stop reading.
+pub fn raw(text: &str) -> anyhow::Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        outcome => Ok(outcome?),
+    }
 }
 
 /// The error and what led to it, a line each.

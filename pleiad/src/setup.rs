@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use pleiad_agent::config::{
     AgentConfig, AngleNoise, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LengthNoise,
-    MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection, Strategy,
+    MotionSection, OutputSection, PriorSection, RangeBearingNoise, SensorsSection, Strategy,
 };
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_recording::{Recording, RobotRecording};
-use pleiad_sim_peers::scenario::{RelativeKind, RobotSettings};
+use pleiad_sim_peers::agents;
+use pleiad_sim_peers::scenario::RobotSettings;
 use pleiad_sim_peers::{Scenario, SimulatedRun};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -158,72 +159,19 @@ fn map(recording: &Recording) -> Vec<LandmarkRow> {
 /// A simulated team, told what the scenario tells it.
 pub fn simulated(scenario: &Scenario, run: SimulatedRun, filter: FilterArgs) -> Team {
     let landmarks = map(&run.recording);
-    let mut agents = BTreeMap::new();
+    let mut configured = BTreeMap::new();
     for (robot, settings) in &scenario.robots {
         let mut agent = configuration(*robot, &noise_of(settings), filter, &landmarks);
-        agent.prior = run.priors.get(robot).map(|prior| PriorSection {
-            x_m: prior.pose.x_m(),
-            y_m: prior.pose.y_m(),
-            heading_rad: prior.pose.yaw_rad(),
-            sigma_position_m: prior.sigma_position_m,
-            sigma_heading_rad: prior.sigma_heading_rad,
-            for_boot: 0,
-        });
-        agents.insert(*robot, agent);
+        agent.prior = run.priors.get(robot).map(agents::prior);
+        configured.insert(*robot, agent);
     }
     let samples = run.recording.robots.iter().map(|(robot, channels)| (*robot, channels.samples())).collect();
-    Team { agents, samples, recording: run.recording, notes: Vec::new() }
+    Team { agents: configured, samples, recording: run.recording, notes: Vec::new() }
 }
 
 /// What a simulated robot's agent has to know: the noises the world was made with.
-fn noise_of(settings: &RobotSettings) -> NoiseFile {
-    let noise = &settings.odometry.noise;
-    let motion = MotionSection {
-        wheel_radius_m: Some(settings.wheel_radius_m),
-        track_width_m: Some(settings.track_width_m),
-        forward_m_per_sqrt_s: noise.speed_m_per_sqrt_s,
-        lateral_m_per_sqrt_s: noise.lateral_m_per_sqrt_s,
-        yaw_rad_per_sqrt_s: noise.yaw_rad_per_sqrt_s,
-        forward_m_per_sqrt_m: noise.speed_m_per_sqrt_m,
-        yaw_rad_per_sqrt_rad: noise.yaw_rad_per_sqrt_rad,
-        quiet_at_standstill: noise.quiet_at_standstill,
-        speed_limit_m_s: settings.motion.speed_m_s.max(0.1),
-        yaw_rate_limit_rad_s: settings.motion.max_yaw_rate_rad_s.max(0.1),
-        ..MotionSection::default()
-    };
-    let mut sensors = SensorsSection::default();
-    let relative = &settings.relative;
-    if relative.rate_hz > 0.0 {
-        match relative.kind {
-            RelativeKind::Pose => {
-                sensors.relative_pose = Some(PoseNoise {
-                    sigma_position_m: relative.sigma_position_m,
-                    sigma_yaw_rad: relative.sigma_yaw_rad,
-                });
-                // Of a landmark the same sensor gives a position.
-                sensors.relative_position = Some(LengthNoise { sigma_m: relative.sigma_position_m });
-            }
-            RelativeKind::Position => {
-                sensors.relative_position = Some(LengthNoise { sigma_m: relative.sigma_position_m });
-            }
-            RelativeKind::Range => sensors.range = Some(LengthNoise { sigma_m: relative.sigma_range_m }),
-            RelativeKind::Bearing => {
-                sensors.bearing = Some(AngleNoise { sigma_rad: relative.sigma_bearing_rad });
-            }
-            RelativeKind::RangeBearing => {
-                sensors.range_bearing = Some(RangeBearingNoise {
-                    sigma_range_m: relative.sigma_range_m,
-                    sigma_bearing_rad: relative.sigma_bearing_rad,
-                });
-            }
-        }
-    }
-    if settings.gps.rate_hz > 0.0 {
-        sensors.gps = Some(LengthNoise { sigma_m: settings.gps.sigma_m });
-    }
-    if settings.heading.rate_hz > 0.0 {
-        sensors.heading = Some(AngleNoise { sigma_rad: settings.heading.sigma_rad });
-    }
+pub fn noise_of(settings: &RobotSettings) -> NoiseFile {
+    let (motion, sensors) = (agents::motion(settings), agents::sensors(settings));
     NoiseFile { filter: FilterSection::default(), motion, sensors }
 }
 

@@ -8,6 +8,7 @@
 //! [`Fleet`] runs real nodes on such samples, or on recorded ones, in one process under virtual time;
 //! [`feed()`] hands them to running agents through their sensor keys.
 
+pub mod agents;
 pub mod error;
 pub mod feed;
 pub mod fleet;

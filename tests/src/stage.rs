@@ -10,10 +10,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
-use pleiad_agent::config::{
-    AgentConfig, BusSection, ClockSection, FilterSection, LengthNoise, MotionSection, OutputSection,
-    PoseNoise, PriorSection, SensorsSection, Strategy,
-};
+use pleiad_agent::config::{AgentConfig, BusSection, ClockSection, FilterSection, OutputSection, Strategy};
 use pleiad_agent::journal::Journal;
 use pleiad_agent::{Record, driver};
 use pleiad_bus::{Bus, ZenohBus, ZenohConfig};
@@ -24,6 +21,7 @@ use pleiad_estimation::sample::Sample;
 use pleiad_estimation::{Pose2, RobotId};
 use pleiad_protocol::keys::{self, Kind};
 use pleiad_protocol::{ControlReply, ControlRequest, Message, Status, TeamName};
+use pleiad_sim_peers::agents;
 use pleiad_sim_peers::{Fleet, FleetOptions, Prior, Scenario, SimulatedRun, simulate};
 use tempfile::TempDir;
 use tokio::time::Instant;
@@ -122,29 +120,14 @@ impl Stage {
     /// What a robot's agent is told of the world it is in.
     fn agent(&self, robot: RobotId, bus: BusSection) -> AgentConfig {
         let settings = &self.scenario.robots[&robot];
-        let noise = &settings.odometry.noise;
         AgentConfig {
             team: self.team.to_string(),
             robot: robot.0,
             strategy: Strategy::Exact,
             filter: FilterSection::default(),
-            prior: self.run.priors.get(&robot).map(prior_section),
-            motion: MotionSection {
-                forward_m_per_sqrt_s: noise.speed_m_per_sqrt_s,
-                lateral_m_per_sqrt_s: noise.lateral_m_per_sqrt_s,
-                yaw_rad_per_sqrt_s: noise.yaw_rad_per_sqrt_s,
-                speed_limit_m_s: settings.motion.speed_m_s,
-                yaw_rate_limit_rad_s: settings.motion.max_yaw_rate_rad_s,
-                ..MotionSection::default()
-            },
-            sensors: SensorsSection {
-                relative_pose: Some(PoseNoise {
-                    sigma_position_m: settings.relative.sigma_position_m,
-                    sigma_yaw_rad: settings.relative.sigma_yaw_rad,
-                }),
-                gps: (settings.gps.rate_hz > 0.0).then_some(LengthNoise { sigma_m: settings.gps.sigma_m }),
-                ..SensorsSection::default()
-            },
+            prior: self.run.priors.get(&robot).map(agents::prior),
+            motion: agents::motion(settings),
+            sensors: agents::sensors(settings),
             clock: ClockSection::default(),
             landmarks: Vec::new(),
             bus,
@@ -167,7 +150,7 @@ impl Stage {
             sigma_heading_rad: settings.sigma_heading_rad,
         };
         let mut config = self.configs[&robot].clone();
-        config.prior = Some(prior_section(&prior));
+        config.prior = Some(agents::prior(&prior));
         self.configure(config);
     }
 
@@ -382,16 +365,5 @@ impl Drop for Stage {
     fn drop(&mut self) {
         let pids = self.processes().into_iter().map(|pid| pid.to_string());
         let _ = Command::new("kill").arg("-KILL").args(pids).stderr(Stdio::null()).status();
-    }
-}
-
-fn prior_section(prior: &Prior) -> PriorSection {
-    PriorSection {
-        x_m: prior.pose.x_m(),
-        y_m: prior.pose.y_m(),
-        heading_rad: prior.pose.yaw_rad(),
-        sigma_position_m: prior.sigma_position_m,
-        sigma_heading_rad: prior.sigma_heading_rad,
-        for_boot: 0,
     }
 }

@@ -8,8 +8,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 use pleiad_agent::NodeConfig;
 use pleiad_agent::config::{
-    AgentConfig, AngleNoise, BusSection, ClockSection, FilterSection, LandmarkRow, LengthNoise,
-    MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection, Strategy,
+    AgentConfig, BusSection, ClockSection, FilterSection, LandmarkRow, OutputSection, Strategy,
 };
 use pleiad_estimation::fact::Entry;
 use pleiad_estimation::fold::{FoldConfig, fold};
@@ -20,8 +19,9 @@ use pleiad_estimation::motion::{DeadReckoning, Step};
 use pleiad_estimation::nominal::NominalTrajectory;
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
-use pleiad_sim_peers::scenario::{RelativeKind, RobotSettings};
-use pleiad_sim_peers::{Fleet, FleetOptions, MemberOutcome, Prior, Scenario, SimulatedRun, simulate};
+use pleiad_sim_peers::agents;
+use pleiad_sim_peers::scenario::RobotSettings;
+use pleiad_sim_peers::{Fleet, FleetOptions, MemberOutcome, Scenario, SimulatedRun, simulate};
 
 /// Digest rounds granted after the last sample; without faults one is enough.
 const SETTLING_ROUNDS: u32 = 200;
@@ -103,9 +103,9 @@ impl Team {
                 robot: robot.0,
                 strategy: Strategy::Exact,
                 filter: FilterSection::default(),
-                prior: world.priors.get(robot).map(prior),
-                motion: motion(settings, told.noise),
-                sensors: sensors(settings, told.noise),
+                prior: world.priors.get(robot).map(agents::prior),
+                motion: agents::motion(&told_as(settings, told.noise)),
+                sensors: agents::sensors(&told_as(settings, told.noise)),
                 clock: ClockSection::default(),
                 landmarks: landmarks.clone(),
                 bus: BusSection::default(),
@@ -277,61 +277,25 @@ fn reckon(config: &NodeConfig, samples: &[Sample]) -> Reckoned {
     reckoned
 }
 
-fn prior(prior: &Prior) -> PriorSection {
-    PriorSection {
-        x_m: prior.pose.x_m(),
-        y_m: prior.pose.y_m(),
-        heading_rad: prior.pose.yaw_rad(),
-        sigma_position_m: prior.sigma_position_m,
-        sigma_heading_rad: prior.sigma_heading_rad,
-        for_boot: 0,
+/// The settings as if all noises were `told` times what they are.
+fn told_as(settings: &RobotSettings, told: f64) -> RobotSettings {
+    let mut scaled = settings.clone();
+    let noise = &mut scaled.odometry.noise;
+    let relative = &mut scaled.relative;
+    for sigma in [
+        &mut noise.speed_m_per_sqrt_s,
+        &mut noise.lateral_m_per_sqrt_s,
+        &mut noise.yaw_rad_per_sqrt_s,
+        &mut noise.speed_m_per_sqrt_m,
+        &mut noise.yaw_rad_per_sqrt_rad,
+        &mut relative.sigma_range_m,
+        &mut relative.sigma_bearing_rad,
+        &mut relative.sigma_position_m,
+        &mut relative.sigma_yaw_rad,
+        &mut scaled.gps.sigma_m,
+        &mut scaled.heading.sigma_rad,
+    ] {
+        *sigma *= told;
     }
-}
-
-fn motion(settings: &RobotSettings, told: f64) -> MotionSection {
-    let noise = &settings.odometry.noise;
-    MotionSection {
-        wheel_radius_m: Some(settings.wheel_radius_m),
-        track_width_m: Some(settings.track_width_m),
-        forward_m_per_sqrt_s: told * noise.speed_m_per_sqrt_s,
-        lateral_m_per_sqrt_s: told * noise.lateral_m_per_sqrt_s,
-        yaw_rad_per_sqrt_s: told * noise.yaw_rad_per_sqrt_s,
-        forward_m_per_sqrt_m: told * noise.speed_m_per_sqrt_m,
-        yaw_rad_per_sqrt_rad: told * noise.yaw_rad_per_sqrt_rad,
-        quiet_at_standstill: noise.quiet_at_standstill,
-        ..MotionSection::default()
-    }
-}
-
-fn sensors(settings: &RobotSettings, told: f64) -> SensorsSection {
-    let relative = &settings.relative;
-    let length = |sigma_m: f64| Some(LengthNoise { sigma_m: told * sigma_m });
-    let angle = |sigma_rad: f64| Some(AngleNoise { sigma_rad: told * sigma_rad });
-    let mut sensors = SensorsSection::default();
-    match relative.kind {
-        RelativeKind::Pose => {
-            sensors.relative_pose = Some(PoseNoise {
-                sigma_position_m: told * relative.sigma_position_m,
-                sigma_yaw_rad: told * relative.sigma_yaw_rad,
-            });
-            // Of a landmark the same sensor gives a position.
-            sensors.relative_position = length(relative.sigma_position_m);
-        }
-        RelativeKind::Position => sensors.relative_position = length(relative.sigma_position_m),
-        RelativeKind::Range => sensors.range = length(relative.sigma_range_m),
-        RelativeKind::Bearing => sensors.bearing = angle(relative.sigma_bearing_rad),
-        RelativeKind::RangeBearing => {
-            sensors.range_bearing = Some(RangeBearingNoise {
-                sigma_range_m: told * relative.sigma_range_m,
-                sigma_bearing_rad: told * relative.sigma_bearing_rad,
-            });
-        }
-    }
-    if settings.gps.rate_hz > 0.0 {
-        sensors.gps = length(settings.gps.sigma_m);
-    }
-    if settings.heading.rate_hz > 0.0 {
-        sensors.heading = angle(settings.heading.sigma_rad);
-    }
-    sensors
+    scaled
 }

@@ -2,28 +2,20 @@
 //! engine. `PLEIAD_RECORDINGS` names the folder that holds `mrclam/` and `physics-engine/`;
 //! `cargo test -p pleiad-tests --features recordings --test recordings`.
 //!
-//! Noise was chosen on dataset 2 and frozen before dataset 6 was looked at (`docs/benchmarks/mrclam.md`).
+//! Noise was chosen on dataset 2 alone (`docs/benchmarks/mrclam.md`).
 
 #![cfg(feature = "recordings")]
 #![allow(clippy::expect_used, clippy::panic, reason = "helpers of tests fail by panicking")]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::LazyLock;
 
+use pleiad_tests::program;
 use serde_json::Value;
 use tempfile::TempDir;
 
 /// The first ten minutes that all robots cover.
 const TEN_MINUTES: [&str; 2] = ["--seconds", "600"];
-
-static PROGRAM: LazyLock<PathBuf> = LazyLock::new(|| {
-    let built = Command::new(env!("CARGO")).args(["build", "--quiet", "-p", "pleiad"]).status();
-    assert!(built.expect("cargo can be run").success(), "pleiad does not build");
-    let test = std::env::current_exe().expect("this test is a file");
-    let folder = test.ancestors().nth(2).expect("a test lies in <target>/<profile>/deps");
-    folder.join("pleiad").with_extension(std::env::consts::EXE_EXTENSION)
-});
 
 fn recording(path: &str) -> PathBuf {
     let how = "set PLEIAD_RECORDINGS to the folder that holds mrclam/MRCLAM_Dataset2 and \
@@ -38,7 +30,8 @@ fn recording(path: &str) -> PathBuf {
 
 /// What a command prints as JSON.
 fn json(arguments: &[&str]) -> Value {
-    let output = Command::new(&*PROGRAM).args(arguments).arg("--json").output().expect("pleiad can be run");
+    let output =
+        Command::new(program::pleiad()).args(arguments).arg("--json").output().expect("pleiad can be run");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "pleiad {arguments:?}: {said}");
     serde_json::from_slice(&output.stdout).expect("one JSON object")

@@ -9,6 +9,5 @@ use crate::output;
 pub fn completions(shell: clap_complete::Shell) -> anyhow::Result<()> {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "pleiad", &mut text);
-    output::raw(&String::from_utf8(text)?);
-    Ok(())
+    output::raw(&String::from_utf8(text)?)
 }
