@@ -118,7 +118,7 @@ pub struct ReplayArgs {
     /// Seed of position fixes made from ground truth.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Noise and geometry of the robots: a file with the sections [filter], [motion] and [sensors] of an
+    /// Noise and geometry of the robots: a file with the sections filter, motion and sensors of an
     /// agent's configuration. Default: noise.toml in the recording, or what is built in for its form.
     #[arg(long)]
     pub noise: Option<PathBuf>,
