@@ -41,6 +41,12 @@ const fn component(name: &'static str, unit: &'static str) -> Component {
     Component { name, unit }
 }
 
+const ACTUATOR: &[Component] = &[component("mean_rad", "rad"), component("difference_rad", "rad")];
+const BODY: &[Component] =
+    &[component("forward_m", "m"), component("left_m", "m"), component("yaw_rad", "rad")];
+const GYRO: &[Component] = &[component("yaw_rate_rad_s", "rad/s")];
+const GPS: &[Component] = &[component("forward_m", "m"), component("left_m", "m")];
+const HEADING: &[Component] = &[component("heading_rad", "rad")];
 const RANGE: &[Component] = &[component("range_m", "m")];
 const BEARING: &[Component] = &[component("bearing_rad", "rad")];
 
@@ -76,13 +82,11 @@ impl Channel {
     /// What a residual consists of.
     pub const fn components(self) -> &'static [Component] {
         match self {
-            Self::Actuator => &[component("mean_rad", "rad"), component("difference_rad", "rad")],
-            Self::Body => {
-                &[component("forward_m", "m"), component("left_m", "m"), component("yaw_rad", "rad")]
-            }
-            Self::Gyro => &[component("yaw_rate_rad_s", "rad/s")],
-            Self::Gps => &[component("forward_m", "m"), component("left_m", "m")],
-            Self::Heading => &[component("heading_rad", "rad")],
+            Self::Actuator => ACTUATOR,
+            Self::Body => BODY,
+            Self::Gyro => GYRO,
+            Self::Gps => GPS,
+            Self::Heading => HEADING,
             Self::RangeToLandmark | Self::RangeToRobot => RANGE,
             Self::BearingToLandmark | Self::BearingToRobot => BEARING,
         }
