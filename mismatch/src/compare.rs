@@ -42,6 +42,7 @@ pub fn residuals<S: Scalar>(
 }
 
 /// What keeps a whole channel from being compared: wheels or truth that are missing or stuck.
+#[allow(clippy::float_cmp, reason = "a reading that is stuck repeats exactly")]
 fn obstacle(evidence: &Evidence<'_>, robot: RobotId, channel: Channel) -> Option<Omission> {
     let Some((_, track)) = evidence.robot(robot) else { return Some(Omission::NotRecorded("robot")) };
     let wheels = &track.encoders;

@@ -32,7 +32,7 @@ pub(crate) struct Track {
     pub(crate) truth: Vec<(f64, Pose<f64>)>,
     reckoned: Vec<Reckoned>,
     radius_m: f64,
-    track_m: f64,
+    axle_m: f64,
 }
 
 impl Track {
@@ -50,7 +50,7 @@ impl Track {
             truth: recording.truth.iter().map(truth_pose).collect(),
             reckoned: Vec::new(),
             radius_m: model.nominal.wheel_radius,
-            track_m: model.nominal.track_width * ratio,
+            axle_m: model.nominal.track_width * ratio,
         };
         let mut here = Reckoned { pose: Pose::identity(), path_m: 0.0 };
         let mut reckoned = Vec::with_capacity(track.encoders.len());
@@ -67,7 +67,7 @@ impl Track {
     fn rolled(&self, from: Reckoned, before: [f64; 2], after: [f64; 2]) -> Reckoned {
         let [left, right] = [0, 1].map(|wheel| self.radius_m * (after[wheel] - before[wheel]));
         let forward = f64::midpoint(left, right);
-        let moved = Pose::exp(forward, 0.0, (right - left) / self.track_m);
+        let moved = Pose::exp(forward, 0.0, (right - left) / self.axle_m);
         Reckoned { pose: from.pose.compose(&moved), path_m: from.path_m + forward }
     }
 
