@@ -24,6 +24,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// What a scenario or a recording lets the team know of itself.
     Observability(ObservabilityArgs),
+    /// What the nominal model predicts of a recording, and what was measured instead.
+    Simulate(SimulateArgs),
     /// The physics a simulation can leave out: names, parameters, equations.
     Effects(EffectsArgs),
     /// One robot's agent.
@@ -146,6 +148,19 @@ pub struct ObservabilityArgs {
     /// Only this many seconds from the start.
     #[arg(long)]
     pub seconds: Option<f64>,
+    /// One JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// The recording, a folder with nominal.toml in it.
+    #[arg(long, value_name = "RECORDING")]
+    pub from: PathBuf,
+    /// Folder for the residuals; a new one under runs/ if absent.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
     /// One JSON object on stdout.
     #[arg(long)]
     pub json: bool,

@@ -10,6 +10,7 @@ mod run;
 mod runner;
 mod shells;
 mod sim_peers;
+mod simulate;
 
 use crate::cli::Command;
 
@@ -20,6 +21,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Run(args) => run::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Observability(args) => observability::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Agent(args) => agent::run(&args),
         Command::Coordinator(args) => coordinator::run(&args),

@@ -2,8 +2,18 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 8] =
-    ["demo", "run", "replay", "observability", "agent", "coordinator", "sim-peers", "completions"];
+const COMMANDS: [&str; 10] = [
+    "demo",
+    "run",
+    "replay",
+    "observability",
+    "simulate",
+    "effects",
+    "agent",
+    "coordinator",
+    "sim-peers",
+    "completions",
+];
 
 #[test]
 fn help_lists_every_command_and_each_has_its_own() {

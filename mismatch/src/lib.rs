@@ -1,0 +1,30 @@
+//! What a recording says that its nominal model does not.
+//!
+//! A **residual** is measured minus predicted, between two recorded channels that are neighbours in the
+//! signal chain: encoders against commands, truth against encoders, a sensor against its prediction from
+//! the true pose. [`residuals`] is generic over [`Scalar`](pleiad_physics::Scalar), so that the same code
+//! gives residuals and, with a model of [`Dual`](pleiad_physics::Dual), their derivatives.
+//!
+//! [`compare`] does it for every robot of a recording against its own nominal model. What cannot be
+//! compared is said ([`Omission`]); nothing here panics on a recording, and no residual is NaN.
+
+mod actuator;
+mod body;
+mod channel;
+mod compare;
+mod error;
+mod evidence;
+mod model;
+mod residual;
+mod sensors;
+mod summary;
+mod track;
+mod windows;
+
+pub use channel::{Channel, Component, MAX_COMPONENTS};
+pub use compare::{ChannelComparison, RobotComparison, compare, residuals};
+pub use error::MismatchError;
+pub use evidence::Evidence;
+pub use model::{nominal_model, nominal_models};
+pub use residual::{ChannelResiduals, Omission, Regime, Residual};
+pub use summary::{MIN_RESIDUALS, Summary, summarize};
