@@ -62,6 +62,8 @@ impl ZenohConfig {
             ("scouting/gossip/enabled", "true".into()),
             // A stopped or cut-off peer is noticed after this many milliseconds instead of ten seconds.
             ("transport/link/tx/lease", "2000".into()),
+            // Nor is one waited for longer than this when dialled; the next attempt may find it back.
+            ("transport/unicast/open_timeout", "3000".into()),
         ];
         let mut config = zenoh::Config::default();
         for (key, value) in settings {
@@ -103,6 +105,7 @@ mod tests {
     fn lost_links_are_noticed_and_dialled_again_soon() {
         let config = ZenohConfig::default();
         assert_eq!(setting(&config, "transport/link/tx/lease"), 2000);
+        assert_eq!(setting(&config, "transport/unicast/open_timeout"), 3000);
         let retry = setting(&config, "connect/retry");
         assert_eq!(retry["period_init_ms"], 200);
         assert_eq!(retry["period_max_ms"], 1000);
