@@ -49,7 +49,7 @@ pub fn recorded(effect: Option<(Effect, &[f64])>) -> Recording {
     let mut model = nominal_model(&nominal.robots[&RobotId(1)], &nominal.range_sensor, &nominal.noise);
     assert_eq!(model.drive, Drive::Differential);
     if let Some((effect, values)) = effect {
-        model = model.with(ActiveEffect::new(effect, values).unwrap());
+        model = model.with(ActiveEffect::new(effect, values).expect("as many values as parameters"));
     }
     let mut recording = Recording {
         name: "made".to_owned(),

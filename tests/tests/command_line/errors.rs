@@ -43,6 +43,7 @@ fn an_unknown_key_of_a_scenario_is_named_with_file_and_line() {
 fn a_file_that_is_not_there_is_named() {
     refused(&["run", "nowhere.toml", "--out", "out"], &["nowhere.toml"]);
     refused(&["replay", "nowhere", "--out", "out"], &["nowhere", "no such folder"]);
+    refused(&["simulate", "--from", "nowhere"], &["nowhere", "no such folder"]);
     refused(&["replay", "small.toml", "--out", "out"], &["small.toml", "file"]);
     refused(&["observability", "nowhere.toml"], &["nowhere.toml"]);
     refused(&["agent", "--config", "nowhere.toml"], &["nowhere.toml"]);
