@@ -21,6 +21,8 @@ use crate::{Bus, BusError, Incoming, Liveliness, Query, ZenohConfig};
 
 /// Zenoh's own limit is ten seconds, and with a stopped peer it takes them.
 const CLOSE_LIMIT: Duration = Duration::from_secs(2);
+/// What is kept of it for the answers that are still to be sent.
+const LAST_ANSWERS: Duration = Duration::from_millis(500);
 
 /// What `.cargo/config.toml` sets for the compilation of zenoh, as seen by the compilation of this crate.
 const LINGER: Option<&str> = option_env!("TCP_LINGER_TIMEOUT");
@@ -192,8 +194,12 @@ impl Bus for ZenohBus {
     async fn close(&self) {
         self.closing.send_replace(true);
         // On a task of its own, so that whatever it waits for does not keep the caller.
-        let session = self.session.clone();
-        let closing = tokio::spawn(async move { session.close().await });
+        let (session, closing) = (self.session.clone(), self.closing.clone());
+        let closing = tokio::spawn(async move {
+            // Every task has let go when the answers already given are sent and nothing is declared.
+            let _ = tokio::time::timeout(LAST_ANSWERS, closing.closed()).await;
+            session.close().await
+        });
         match tokio::time::timeout(CLOSE_LIMIT, closing).await {
             Ok(Ok(Ok(()))) => {}
             Ok(Ok(Err(cause))) => tracing::warn!(%cause, "the zenoh session did not close cleanly"),

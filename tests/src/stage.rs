@@ -298,10 +298,16 @@ impl Stage {
         }
     }
 
+    /// Tells a robot's agent to end. Its agreement can be lost while it does.
+    pub async fn end(&self, robot: RobotId) {
+        let reply = self.ask(robot, ControlRequest::Shutdown).await;
+        assert!(matches!(reply, None | Some(ControlReply::Accepted)), "robot {robot}: {reply:?}");
+    }
+
     /// Tells all agents to end, and waits until there is no process left.
     pub async fn shut_down(&self) {
         for robot in self.robots() {
-            assert_eq!(self.ask(robot, ControlRequest::Shutdown).await, Some(ControlReply::Accepted));
+            self.end(robot).await;
         }
         let deadline = Instant::now() + PATIENCE;
         let mut looks = tokio::time::interval(LOOK);

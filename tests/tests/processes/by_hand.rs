@@ -75,6 +75,6 @@ async fn a_driver_can_publish_its_samples_one_by_one() {
     let with_prior = 1;
     assert_eq!(count(|body| matches!(body, Body::Observation(_))), gps + seen + with_prior);
     assert_eq!((status.facts.absolute, status.facts.pending), (gps as u64, seen as u64));
-    assert_eq!(stage.ask(ONE, ControlRequest::Shutdown).await, Some(ControlReply::Accepted));
+    stage.end(ONE).await;
     assert!(agent.wait().unwrap().success());
 }
