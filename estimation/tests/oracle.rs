@@ -68,8 +68,11 @@ fn check_equal(ledger: &Ledger, oracle: &JointEstimate) {
 fn check_team(seed: u64, options: &Options) {
     let team = team(seed, options);
     let oracle = oracle(&team.entries, options.config);
-    // A decision within 1e-6 of the gate may fall differently in correct implementations.
-    prop_assume_far_from_gate(&oracle, options.config);
+    // A decision within 1e-6 of the gate may fall differently in correct implementations: such a team,
+    // one in some ten thousand, shows nothing.
+    if !oracle.near_gate(&options.config.gate, 1e-6).is_empty() {
+        return;
+    }
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let ledger = fold(&shuffled(&team.entries, &mut random, 0.2), options.config);
     check_equal(&ledger, &oracle);
@@ -77,7 +80,7 @@ fn check_team(seed: u64, options: &Options) {
     assert!(used > 10, "only {used} facts came to the gate");
 }
 
-fn prop_assume_far_from_gate(oracle: &JointEstimate, config: FoldConfig) {
+fn assert_far_from_gate(oracle: &JointEstimate, config: FoldConfig) {
     let near = oracle.near_gate(&config.gate, 1e-6);
     assert!(near.is_empty(), "decisions on the edge of the gate: {near:?}; choose another seed");
 }
@@ -248,7 +251,7 @@ fn a_restart_with_a_gap_equals_the_oracle_and_widens_the_robot() {
             let gap = Symmetric3::diagonal(4.0, 4.0, 0.25);
             let entries = restarted(&team, at, gap, options.config.hash());
             let oracle = oracle(&entries, options.config);
-            prop_assume_far_from_gate(&oracle, options.config);
+            assert_far_from_gate(&oracle, options.config);
             check_equal(&fold(&entries, options.config), &oracle);
         }
     }

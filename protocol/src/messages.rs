@@ -118,8 +118,6 @@ pub struct SensorBatch {
     pub number: u64,
     /// In the order of their stamps.
     pub samples: Vec<Sample>,
-    /// Virtual now: everything up to this instant has been delivered.
-    pub until: Option<Timestamp>,
     /// Whether this is the last batch.
     pub end: bool,
 }

@@ -252,7 +252,6 @@ pub fn message(rng: &mut impl Rng) -> Message {
         5 => Message::SensorBatch(SensorBatch {
             number: integer(rng),
             samples: several(rng, |rng| sample(rng)),
-            until: maybe(rng, |rng| time(rng)),
             end: rng.random(),
         }),
         6 => Message::SensorAck(SensorAck {

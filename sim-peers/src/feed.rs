@@ -117,7 +117,7 @@ impl<B: Bus> RobotFeed<B> {
         for (index, samples) in chunks.into_iter().enumerate() {
             self.number += 1;
             let end = last && index + 1 == count;
-            let batch = SensorBatch { number: self.number, samples, until: Some(now), end };
+            let batch = SensorBatch { number: self.number, samples, end };
             self.send(batch, patience).await;
         }
     }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use anyhow::bail;
 use pleiad_estimation::RobotId;
 use pleiad_estimation::observability::{Observability, of_entries};
 use pleiad_recording::ReadOptions;
@@ -9,7 +10,7 @@ use pleiad_sim_peers::{Scenario, connectivity, simulate};
 use serde::Serialize;
 
 use super::runner;
-use crate::cli::{ErrorArg, ObservabilityArgs, StrategyArg};
+use crate::cli::{ErrorArg, LandmarksArg, ObservabilityArgs, StrategyArg};
 use crate::evaluation::RunResult;
 use crate::output;
 use crate::setup::{self, FilterArgs, ReplayOptions, Team};
@@ -48,6 +49,9 @@ pub fn of_run(result: &RunResult) -> Observability {
 pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
     let filter = FilterArgs { strategy: StrategyArg::Exact, error: ErrorArg::Invariant };
     let team = if args.input.is_dir() {
+        if args.seed.is_some() {
+            bail!("--seed: a recording has none; it is for scenarios");
+        }
         let folder = setup::recording_folder(&args.input);
         let (recording, ingest) = pleiad_recording::open(&folder, &ReadOptions::default())?;
         setup::recorded(
@@ -65,6 +69,9 @@ pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
             },
         )?
     } else {
+        if args.landmarks != LandmarksArg::Known {
+            bail!("--landmarks: it is for recordings; a scenario says itself what its robots see");
+        }
         let mut scenario = Scenario::load(&args.input)?;
         if let Some(seconds) = args.seconds {
             scenario.duration_s = seconds;

@@ -7,7 +7,7 @@ use anyhow::Context;
 use pleiad_agent::SettledEstimate;
 use pleiad_estimation::Timestamp;
 use pleiad_recording::{IngestReport, ReadOptions, Recording, tum};
-use pleiad_report::{ReplayReport, RobotScore, replay_report, write_summary};
+use pleiad_report::{ReplayReport, RobotScore, replay_report, run_report, write_summary};
 use serde::Serialize;
 
 use super::runner::{self, Feeder, ProcessOptions};
@@ -117,6 +117,7 @@ pub fn write_run(
     ingest: Option<IngestReport>,
 ) -> anyhow::Result<ReplayJson> {
     let (first, last) = team.span().context("there is not a single sample")?;
+    let replayed = ingest.is_some();
     write_trajectories(result, out)?;
     let scores: Vec<RobotScore> =
         result.robots.iter().map(|(robot, own)| evaluation::score(*robot, own, &team.recording)).collect();
@@ -149,7 +150,9 @@ pub fn write_run(
         notes: result.notes.clone(),
         commands: vec![("this report".to_owned(), command.to_owned())],
     };
-    replay_report(&report)?.write(&out.join("report.html"))?;
+    // Without an ingested recording it was a run.
+    let document = if replayed { replay_report(&report)? } else { run_report(&report)? };
+    document.write(&out.join("report.html"))?;
     Ok(json)
 }
 

@@ -59,6 +59,7 @@ pub fn in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
             notes.push(format!("robot {robot}: {notice}"));
         }
         let summary = results::summary(&mut outcome.node, outcome.messages, outcome.bytes);
+        notes.extend(refusals(robot, &summary));
         let result = RobotResult { settled: outcome.node.settled(), online: outcome.online, summary };
         ledger.get_or_insert_with(|| outcome.node.ledger().clone());
         robots.insert(robot, result);
@@ -263,9 +264,7 @@ fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult>
                 summary.estimate
             );
         }
-        for (reason, count) in &summary.samples_refused {
-            notes.push(format!("robot {robot}: {count} samples refused ({reason})"));
-        }
+        notes.extend(refusals(*robot, &summary));
         let settled = results::read_estimates(&folder.join(results::SETTLED))?;
         let online = results::read_estimates(&folder.join(results::ONLINE))?;
         ledger.get_or_insert(own);
@@ -277,4 +276,11 @@ fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult>
     let processes = robots.len();
     let ledger = ledger.context("the team has no robot")?;
     Ok(RunResult { robots, ledger, notes, wall_s, processes })
+}
+
+/// What an agent did not take of its samples.
+fn refusals(robot: RobotId, summary: &AgentSummary) -> Vec<String> {
+    let told =
+        |(reason, count): (&String, &u64)| format!("robot {robot}: {count} samples refused ({reason})");
+    summary.samples_refused.iter().map(told).collect()
 }

@@ -1,6 +1,5 @@
 //! Requests for facts, batches of samples and their acknowledgements.
 
-use pleiad_estimation::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::check;
@@ -22,7 +21,6 @@ struct WireRange {
 #[derive(Serialize, Deserialize)]
 struct WireBatch {
     number: u64,
-    until_ns: Option<i64>,
     end: bool,
 }
 
@@ -61,16 +59,15 @@ pub fn take_request(reader: &mut Reader<'_>) -> Result<FactsRequest, ProtocolErr
 
 /// Appends a batch.
 pub fn put_batch(bytes: &mut Vec<u8>, batch: &SensorBatch) {
-    let until_ns = batch.until.map(|time| time.0);
-    codec::put(bytes, &WireBatch { number: batch.number, until_ns, end: batch.end });
+    codec::put(bytes, &WireBatch { number: batch.number, end: batch.end });
     codec::put_list(bytes, batch.samples.iter().map(WireSample::from));
 }
 
 /// The next batch.
 pub fn take_batch(reader: &mut Reader<'_>) -> Result<SensorBatch, ProtocolError> {
-    let WireBatch { number, until_ns, end } = reader.take("sensor batch")?;
+    let WireBatch { number, end } = reader.take("sensor batch")?;
     let samples = reader.list::<WireSample, _>("samples", limits::SAMPLES)?;
-    Ok(SensorBatch { number, samples, until: until_ns.map(Timestamp), end })
+    Ok(SensorBatch { number, samples, end })
 }
 
 /// Appends an acknowledgement.

@@ -110,3 +110,9 @@ fn a_feed_that_nobody_takes_is_a_failure() {
     let arguments = ["sim-peers", "small.toml", "--team", "nobody", "--connect", endpoint];
     refused(&arguments, &["nobody", "not", "a single sample"]);
 }
+
+#[test]
+fn an_option_that_could_do_nothing_is_refused() {
+    refused(&["observability", "recording", "--seed", "2"], &["--seed", "scenarios"]);
+    refused(&["observability", "small.toml", "--landmarks", "none"], &["--landmarks", "recordings"]);
+}
