@@ -14,17 +14,23 @@ mod channel;
 mod compare;
 mod error;
 mod evidence;
+mod findings;
 mod model;
 mod residual;
 mod sensors;
 mod summary;
 mod track;
+mod view;
 mod windows;
 
 pub use channel::{Channel, Component, MAX_COMPONENTS};
 pub use compare::{ChannelComparison, RobotComparison, compare, residuals};
 pub use error::MismatchError;
 pub use evidence::Evidence;
+pub use findings::{
+    Estimate, Finding, Findings, HeldOut, Place, RobotRollOuts, RollOut, Undetected, Untestable, Verdict,
+};
 pub use model::{nominal_model, nominal_models};
 pub use residual::{ChannelResiduals, Omission, Regime, Residual};
 pub use summary::{MIN_RESIDUALS, Summary, summarize};
+pub use view::{PartialResidual, Plots, ResidualSeries};
