@@ -12,6 +12,7 @@ mod actuator;
 mod body;
 mod channel;
 mod compare;
+mod diagnosis;
 mod error;
 mod evidence;
 mod findings;
