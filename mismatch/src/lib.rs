@@ -10,19 +10,26 @@
 
 mod actuator;
 mod body;
+mod builtin;
 mod channel;
+mod commanded;
 mod compare;
 mod error;
 mod evidence;
+mod gyro;
 mod model;
+mod plan;
+mod reckoning;
 mod residual;
 mod sensors;
+mod sightings;
 mod summary;
 mod track;
 mod windows;
 
+pub use builtin::models;
 pub use channel::{Channel, Component, MAX_COMPONENTS};
-pub use compare::{ChannelComparison, RobotComparison, compare, residuals};
+pub use compare::{ChannelComparison, RobotComparison, compare, end_to_end, residuals, residuals_of};
 pub use error::MismatchError;
 pub use evidence::Evidence;
 pub use model::{nominal_model, nominal_models};
