@@ -102,7 +102,7 @@ impl Pool {
         self.known.retain(|&(effect, whose), _| {
             !added.iter().any(|term| {
                 overlap(term.whose, whose)
-                    && crate::Channel::ALL.iter().any(|&channel| {
+                    && crate::channel::Channel::ALL.iter().any(|&channel| {
                         touches(effect, channel) && touches(term.effect, channel)
                     })
             })

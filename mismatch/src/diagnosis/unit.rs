@@ -108,7 +108,7 @@ impl<'a> Unit<'a> {
             blocks: 0,
             span_s: (0.0, 0.0),
         };
-        for &channel in Channel::ALL {
+        for channel in Channel::ALL {
             let found = residuals_of(evidence, robot, &unit.nominal, channel);
             let components = channel.components().len();
             let first_scale = unit.scales.len();
@@ -129,7 +129,7 @@ impl<'a> Unit<'a> {
                         time_s: row.time_s,
                         regime: row.regime,
                         target: row.target,
-                        agitation: row.agitation(component),
+                        agitation: row.du_squared()[component],
                     });
                     unit.scale_of.push(first_scale + component);
                 }

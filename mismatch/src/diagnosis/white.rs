@@ -136,9 +136,9 @@ pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<S
     let inverse = information.clone().cholesky()?.inverse();
     let change = &inverse * &score;
     // Block sums of the scores after the step.
-    let mut meat = DMatrix::zeros(size, size);
+    let mut meat: DMatrix<f64> = DMatrix::zeros(size, size);
     for (white, own) in whites.iter().zip(&own) {
-        let mut sums = DMatrix::zeros(size, white.unit.blocks);
+        let mut sums: DMatrix<f64> = DMatrix::zeros(size, white.unit.blocks);
         for (which, stretch) in white.unit.stretches.iter().enumerate() {
             let range = stretch.range();
             let shown: Vec<(usize, &[f64])> =
