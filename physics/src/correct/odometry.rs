@@ -26,6 +26,14 @@ pub enum OdometryReading {
         /// Counter-clockwise, rad/s.
         yaw_rate_rad_s: f64,
     },
+    /// A velocity that was measured and holds until the next, by the geometry that the estimator believes
+    /// in.
+    Measured {
+        /// Forward, m/s.
+        speed_m_s: f64,
+        /// Counter-clockwise, rad/s.
+        yaw_rate_rad_s: f64,
+    },
     /// A measured body motion since the reading before, `exp` of forward (m), left (m) and yaw (rad), by
     /// the geometry that the estimator believes in.
     Motion([f64; 3]),
@@ -64,7 +72,7 @@ impl OdometryCorrection {
                 turn(model, &context, &self.scheduled, (command.time_s, time_s), &mut state);
                 self.robot.actuator = state;
             }
-            OdometryReading::Motion(_) => {}
+            OdometryReading::Measured { .. } | OdometryReading::Motion(_) => {}
         }
     }
 
@@ -89,6 +97,14 @@ impl OdometryCorrection {
             (Some(OdometryReading::Wheels(before)), OdometryReading::Wheels(now)) => {
                 self.robot.motion.wheel_angle_rad = before;
                 self.roll(correction, [now[0] - before[0], now[1] - before[1]], step_s);
+                Pose::identity()
+            }
+            (
+                Some(OdometryReading::Measured { speed_m_s, yaw_rate_rad_s }),
+                OdometryReading::Measured { .. },
+            ) => {
+                let wheels = turned(correction, speed_m_s * step_s, yaw_rate_rad_s * step_s);
+                self.roll(correction, wheels, step_s);
                 Pose::identity()
             }
             (Some(OdometryReading::Motion(_)), OdometryReading::Motion([forward_m, left_m, yaw_rad])) => {

@@ -22,11 +22,13 @@ pub struct Polar {
 }
 
 impl Polar {
-    fn of([x, y]: [f64; 2]) -> Self {
+    /// Of a point of the body frame.
+    pub fn of([x, y]: [f64; 2]) -> Self {
         Self { range_m: x.hypot(y), bearing_rad: Scalar::atan2(y, x) }
     }
 
-    fn point(self) -> [f64; 2] {
+    /// The point of the body frame.
+    pub fn point(self) -> [f64; 2] {
         [self.range_m * Scalar::cos(self.bearing_rad), self.range_m * Scalar::sin(self.bearing_rad)]
     }
 }
@@ -129,6 +131,8 @@ impl Correction {
             [range_m, Scalar::wrapped(bearing_rad)]
         };
         let [range_m, bearing_rad] = solve([read.range_m, read.bearing_rad], missing);
+        // Behind the sensor there is no target: its bearing would be another.
+        let range_m = if range_m > 0.0 { range_m } else { f64::NAN };
         let point = Polar { range_m, bearing_rad };
         let mut as_nominal = seen(&self.nominal, place, target, point);
         as_nominal.bearing_rad = Scalar::wrapped(as_nominal.bearing_rad);

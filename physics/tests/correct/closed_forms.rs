@@ -48,6 +48,9 @@ fn a_nominal_parameter_that_was_fitted_again_acts_like_the_effect() {
     // The same motion, told as what the believed geometry makes of it.
     let told = OdometryReading::Motion([0.0, 0.0, 0.05 * 1.2 / 0.3]);
     close(moved(&correction, told, told).yaw_rad, 0.051 * 1.2 / 0.33);
+    // And as a velocity that was measured, over 0.1 s.
+    let told = OdometryReading::Measured { speed_m_s: 0.0, yaw_rate_rad_s: 0.05 * 12.0 / 0.3 };
+    close(moved(&correction, told, told).yaw_rad, 0.051 * 1.2 / 0.33);
 }
 
 #[test]
