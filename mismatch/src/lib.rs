@@ -23,6 +23,8 @@ mod model;
 mod plan;
 mod reckoning;
 mod residual;
+mod rollout;
+mod schedule;
 mod sensors;
 mod sightings;
 mod summary;
@@ -41,5 +43,6 @@ pub use findings::{
 };
 pub use model::{nominal_model, nominal_models};
 pub use residual::{ChannelResiduals, Omission, Regime, Residual};
+pub use rollout::{HORIZONS_S, Rollout, rollouts};
 pub use summary::{MIN_RESIDUALS, Summary, summarize};
 pub use view::{PartialResidual, Plots, ResidualSeries};
