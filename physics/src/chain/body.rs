@@ -21,6 +21,32 @@ impl<S: Scalar> Default for BodyState<S> {
     }
 }
 
+/// What a step adds to a pose, and the mean velocities in it.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyIncrement<S> {
+    /// Driven, in the frame of the robot at the beginning.
+    pub driven: Pose<S>,
+    /// What the surroundings add, in the map.
+    pub added: MapMotion<S>,
+    /// Mean forward speed, m/s.
+    pub speed_m_s: S,
+    /// Mean yaw rate, rad/s.
+    pub yaw_rate_rad_s: S,
+    /// Change of speed from the step before, m/s^2.
+    pub acceleration_m_s2: S,
+}
+
+impl<S: Scalar> BodyIncrement<S> {
+    /// The pose at the end of a step that began at `start`.
+    pub fn applied_to(&self, start: &Pose<S>) -> Pose<S> {
+        let mut pose = start.compose(&self.driven);
+        pose.x_m += self.added.shift_m[0];
+        pose.y_m += self.added.shift_m[1];
+        pose.yaw_rad += self.added.yaw_rad;
+        pose
+    }
+}
+
 /// The outcome of a step of the body.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyStep<S> {
@@ -44,6 +70,23 @@ pub fn advance<S: Scalar>(
     turned_rad: [S; 2],
     state: &mut BodyState<S>,
 ) -> BodyStep<S> {
+    let increment = increment(model, context, turned_rad, state);
+    BodyStep {
+        pose: increment.applied_to(&context.motion.pose),
+        speed_m_s: increment.speed_m_s,
+        yaw_rate_rad_s: increment.yaw_rate_rad_s,
+        acceleration_m_s2: increment.acceleration_m_s2,
+    }
+}
+
+/// What [`advance`] adds to a pose. A simulator gives the context the pose in the middle of the step, where
+/// effects of place and heading are at their mean.
+pub fn increment<S: Scalar>(
+    model: &RobotModel<S>,
+    context: &Context<S>,
+    turned_rad: [S; 2],
+    state: &mut BodyState<S>,
+) -> BodyIncrement<S> {
     let step_s = context.step_s;
     let geometry = geometry(model, context);
     let [left, right] = geometry.wheel_radius_m;
@@ -65,17 +108,13 @@ pub fn advance<S: Scalar>(
     if let Some(since) = &mut state.castor.since_reversal_m {
         *since += forward_m.abs();
     }
-
-    let mut pose = context.motion.pose.compose(&Pose::exp(body.forward_m, body.left_m, body.yaw_rad));
     let mut added = MapMotion { shift_m: [S::zero(); 2], yaw_rad: S::zero() };
     model.apply(&context, |effect, values| effect.world(values, &context, &mut added));
-    pose.x_m += added.shift_m[0];
-    pose.y_m += added.shift_m[1];
-    pose.yaw_rad += added.yaw_rad;
 
     state.speed_m_s = Some(speed);
-    BodyStep {
-        pose,
+    BodyIncrement {
+        driven: Pose::exp(body.forward_m, body.left_m, body.yaw_rad),
+        added,
         speed_m_s: body.forward_m / step_s,
         yaw_rate_rad_s: (body.yaw_rad + added.yaw_rad) / step_s,
         acceleration_m_s2: context.motion.acceleration_m_s2,

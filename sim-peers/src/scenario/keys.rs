@@ -9,11 +9,11 @@ use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
 use super::load::Document;
-use super::{RobotSettings, Start};
+use super::{Declared, RobotSettings, Start};
 use crate::Error;
 
 /// Keys whose value is one of a few words, by the end of their path.
-const CHOICES: [(&str, &[&str]); 5] = [
+const CHOICES: [(&str, &[&str]); 6] = [
     (
         "motion.policy",
         &[
@@ -25,8 +25,11 @@ const CHOICES: [(&str, &[&str]); 5] = [
             "parked",
             "portable_landmarks",
             "one_mover",
+            "manoeuvres",
+            "script",
         ],
     ),
+    ("drive.kind", &["differential", "skid_steer", "car_like"]),
     ("motion.direction", &["counter_clockwise", "clockwise"]),
     ("odometry.kind", &["velocity", "wheels", "increment"]),
     ("relative.kind", &["range_bearing", "pose", "position", "range", "bearing"]),
@@ -59,7 +62,9 @@ impl Lines {
 pub(super) fn template() -> Result<Table, toml::ser::Error> {
     let mut settings = RobotSettings { start: Some(Start::default()), ..RobotSettings::default() };
     settings.motion.area_m = Some([0.0; 4]);
+    settings.motion.script = vec![[0.0; 3]];
     settings.gps.windows_s = vec![[0.0; 2]];
+    settings.declared = Declared::example();
     let defaults = Table::try_from(&settings)?;
     let mut robot = defaults.clone();
     robot.insert("id".to_owned(), Value::Integer(1));

@@ -25,6 +25,10 @@ pub(super) struct Document {
     #[serde(default = "truth_rate_hz")]
     truth_rate_hz: f64,
     #[serde(default)]
+    truth_sigma_m: f64,
+    #[serde(default)]
+    truth_sigma_rad: f64,
+    #[serde(default)]
     team_size: u32,
     #[serde(default)]
     random_landmarks: u32,
@@ -63,6 +67,8 @@ impl Document {
             duration_s: 0.0,
             arena: Arena::default(),
             truth_rate_hz: truth_rate_hz(),
+            truth_sigma_m: 0.0,
+            truth_sigma_rad: 0.0,
             team_size: 0,
             random_landmarks: 0,
             landmarks: vec![Landmark { id: 0, x_m: 0.0, y_m: 0.0 }],
@@ -138,6 +144,8 @@ impl Loader<'_> {
             duration_s: document.duration_s,
             arena: document.arena,
             truth_rate_hz: document.truth_rate_hz,
+            truth_sigma_m: document.truth_sigma_m,
+            truth_sigma_rad: document.truth_sigma_rad,
             landmarks,
             random_landmarks: document.random_landmarks,
             robots,
