@@ -5,10 +5,11 @@
 
 use std::collections::BTreeMap;
 
+use pleiad_recording::{EffectSpec, ScopeSpec};
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-use super::load::Document;
+use super::load::{Document, EFFECTS};
 use super::{Declared, RobotSettings, Start};
 use crate::Error;
 
@@ -65,7 +66,10 @@ pub(super) fn template() -> Result<Table, toml::ser::Error> {
     settings.motion.script = vec![[0.0; 3]];
     settings.gps.windows_s = vec![[0.0; 2]];
     settings.declared = Declared::example();
-    let defaults = Table::try_from(&settings)?;
+    let mut defaults = Table::try_from(&settings)?;
+    let within = ScopeSpec { region_m: Some([0.0; 4]), time_s: Some([0.0; 2]) };
+    let effect = EffectSpec { within: Some(within), ..EffectSpec::default() };
+    defaults.insert(EFFECTS.to_owned(), Value::Array(vec![Value::try_from(effect)?]));
     let mut robot = defaults.clone();
     robot.insert("id".to_owned(), Value::Integer(1));
     Table::try_from(Document::example(defaults, robot))
@@ -131,6 +135,8 @@ impl Walk<'_> {
             expected: expected.to_owned(),
         };
         match (expected, found.get_ref()) {
+            // The parameters of an effect: its catalogue entry knows them.
+            (Value::Table(known), DeValue::Table(_)) if known.is_empty() => Ok(()),
             (Value::Table(known), DeValue::Table(table)) => self.table(table, known, path),
             (Value::Array(known), DeValue::Array(items)) => {
                 let Some(expected) = known.first() else { return Ok(()) };

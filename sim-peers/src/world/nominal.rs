@@ -70,7 +70,7 @@ fn nominal_robot(robot: &RobotSettings) -> NominalRobot {
     );
     let mut nominal = NominalRobot {
         wheel_radius: robot.wheel_radius_m,
-        track_width: robot.drive.effective_track_m(robot.track_width_m),
+        track_width: robot.track_width_m,
         encoder_ticks_per_rev: f64::from(robot.encoder_ticks_per_rev),
         servo_time_constant_s: robot.servo_time_constant_s,
         servo_time_constant_turn_s: robot.servo_time_constant_turn_s,
@@ -79,6 +79,7 @@ fn nominal_robot(robot: &RobotSettings) -> NominalRobot {
         gyro_bias_rad_s: robot.gyro.bias_rad_s,
         gyro_scale: 1.0,
         rates_hz,
+        drive: robot.drive.drive(),
         ..NominalRobot::default()
     };
     robot.declared.apply(&mut nominal);
