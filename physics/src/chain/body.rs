@@ -6,6 +6,9 @@ use crate::pose::Pose;
 use crate::scalar::Scalar;
 use crate::signal::{BodyMotion, Castor, Geometry, MapMotion, Rolling};
 
+/// A castor turns round once the robot has rolled so far the other way, metres: a few ticks of an encoder.
+const CASTOR_PLAY_M: f64 = 0.001;
+
 /// What the body remembers from step to step.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyState<S> {
@@ -17,7 +20,7 @@ pub struct BodyState<S> {
 
 impl<S: Scalar> Default for BodyState<S> {
     fn default() -> Self {
-        Self { speed_m_s: None, castor: Castor { direction: 0, since_reversal_m: None } }
+        Self { speed_m_s: None, castor: Castor { direction: 0, since_reversal_m: None, against_m: 0.0 } }
     }
 }
 
@@ -158,17 +161,25 @@ fn kinematics<S: Scalar>(
     (forward, yaw)
 }
 
-/// Notes a reversal; the castor begins to swing round in the step that reverses.
+/// Notes a reversal; the castor begins to swing round in the step in which the robot has rolled
+/// [`CASTOR_PLAY_M`] the other way. Less is no reversal: a robot that spins does not roll, but for the ticks of
+/// its encoders.
 fn turn_castor<S: Scalar>(castor: &mut Castor<S>, forward_m: S) {
-    let direction = match forward_m.value() {
-        forward if forward > 0.0 => 1,
-        forward if forward < 0.0 => -1,
-        _ => return,
-    };
-    if castor.direction == -direction {
-        castor.since_reversal_m = Some(S::zero());
+    let forward_m = forward_m.value();
+    if castor.direction == 0 {
+        castor.against_m += forward_m;
+        if castor.against_m.abs() > CASTOR_PLAY_M {
+            castor.direction = if castor.against_m > 0.0 { 1 } else { -1 };
+            castor.against_m = 0.0;
+        }
+        return;
     }
-    castor.direction = direction;
+    castor.against_m = (castor.against_m - f64::from(castor.direction) * forward_m).max(0.0);
+    if castor.against_m > CASTOR_PLAY_M {
+        castor.since_reversal_m = Some(S::zero());
+        castor.direction = -castor.direction;
+        castor.against_m = 0.0;
+    }
 }
 
 #[cfg(test)]
@@ -206,10 +217,24 @@ mod tests {
 
     #[test]
     fn a_castor_begins_to_swing_at_a_reversal_only() {
-        let mut castor = Castor { direction: 0, since_reversal_m: None };
+        let mut castor = Castor { direction: 0, since_reversal_m: None, against_m: 0.0 };
         for (forward, reversed) in [(0.1, false), (0.0, false), (0.2, false), (-0.1, true)] {
             turn_castor(&mut castor, forward);
             assert_eq!(castor.since_reversal_m.is_some(), reversed);
         }
+    }
+
+    #[test]
+    fn ticks_of_the_encoders_are_no_reversal_and_a_slow_one_is() {
+        let mut castor = Castor { direction: 1, since_reversal_m: None, against_m: 0.0 };
+        for _ in 0..1000 {
+            turn_castor(&mut castor, 3e-4);
+            turn_castor(&mut castor, -3e-4);
+        }
+        assert_eq!(castor.since_reversal_m, None);
+        for _ in 0..1000 {
+            turn_castor(&mut castor, -2e-6);
+        }
+        assert_eq!((castor.since_reversal_m, castor.direction), (Some(0.0), -1));
     }
 }

@@ -63,7 +63,7 @@ impl Default for RobotSettings {
             servo_time_constant_s: 0.1,
             servo_time_constant_turn_s: 0.1,
             command_jitter_s: 0.0,
-            voltage_rate_v_per_s: -0.001,
+            voltage_rate_v_per_s: 0.0,
             drive: DriveSettings::default(),
             declared: Declared::default(),
             effects: Vec::new(),

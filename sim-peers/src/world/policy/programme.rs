@@ -120,8 +120,8 @@ fn crawl(limits: &Limits) -> Manoeuvre {
 /// A wavy line ahead, and back along it.
 fn weave(speed: f64, turn: f64, reach_m: f64) -> Manoeuvre {
     let half_s = 0.7;
-    let waves = ((1.5 * reach_m / speed / (2.0 * half_s)).floor()).max(1.0);
-    let waves = (0..).take_while(|wave| f64::from(*wave) < waves).count();
+    let most = 1.5 * reach_m / speed / (2.0 * half_s);
+    let waves = (1..20).filter(|wave| f64::from(*wave) <= most).count().max(1);
     let wave = |speed: f64, turn: f64| {
         [[speed, turn, 0.5 * half_s], [speed, -turn, half_s], [speed, turn, 0.5 * half_s]]
     };
@@ -141,15 +141,12 @@ fn eight(limits: &Limits, speed: f64) -> Manoeuvre {
 
 /// A square; a car rounds its corners.
 fn square(limits: &Limits, speed: f64, sense: f64) -> Manoeuvre {
-    let corner = match limits.tightest_m {
-        None => {
-            let turn = 0.7 * limits.yaw_rate_rad_s;
-            vec![[0.0, 0.0, 0.5], [0.0, sense * turn, FRAC_PI_2 / turn], [0.0, 0.0, 0.5]]
-        }
-        Some(_) => {
-            let yaw_rate = speed / limits.radius(0.0);
-            vec![[speed, sense * yaw_rate, FRAC_PI_2 / yaw_rate]]
-        }
+    let corner = if limits.tightest_m.is_none() {
+        let turn = 0.7 * limits.yaw_rate_rad_s;
+        vec![[0.0, 0.0, 0.5], [0.0, sense * turn, FRAC_PI_2 / turn], [0.0, 0.0, 0.5]]
+    } else {
+        let yaw_rate = speed / limits.radius(0.0);
+        vec![[speed, sense * yaw_rate, FRAC_PI_2 / yaw_rate]]
     };
     let rounded_m = limits.tightest_m.map_or(0.0, |_| 2.0 * limits.radius(0.0));
     let side_m = (1.4 * limits.reach_m - rounded_m).max(0.1);
