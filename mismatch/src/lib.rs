@@ -12,6 +12,7 @@ mod actuator;
 mod body;
 mod channel;
 mod compare;
+mod diagnose;
 mod error;
 mod evidence;
 mod findings;
@@ -25,6 +26,7 @@ mod windows;
 
 pub use channel::{Channel, Component, MAX_COMPONENTS};
 pub use compare::{ChannelComparison, RobotComparison, compare, residuals};
+pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, diagnose};
 pub use error::MismatchError;
 pub use evidence::Evidence;
 pub use findings::{
