@@ -39,6 +39,16 @@ pub fn with_interval(value: f64, ci95: [f64; 2], unit: &str) -> String {
     format!("{}{unit} ({}..{}{unit})", at(value), at(ci95[0]), at(ci95[1]))
 }
 
+/// A size of which only the order and a second digit matter (`0.0021`).
+pub(crate) fn two_digits(value: f64) -> String {
+    if !value.is_finite() || value == 0.0 || !(1e-6..1e6).contains(&value.abs()) {
+        return quantity(value, "");
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=7")]
+    let decimals = (1.0 - value.abs().log10().floor()).clamp(0.0, 7.0) as usize;
+    format!("{value:.decimals$}")
+}
+
 /// Decimals that show one significant digit of `width`, two of one that begins with 1 or 2; at most nine.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=9")]
 fn decimals_for(width: f64) -> usize {
@@ -153,6 +163,14 @@ mod tests {
         ];
         for (value, ci95, unit, text) in cases {
             assert_eq!(with_interval(value, ci95, unit), text);
+        }
+    }
+
+    #[test]
+    fn sizes_have_two_digits() {
+        let cases = [(0.002_09, "0.0021"), (3.12, "3.1"), (41.4, "41"), (0.0, "0"), (f64::NAN, "n/a")];
+        for (value, text) in cases {
+            assert_eq!(two_digits(value), text);
         }
     }
 

@@ -8,8 +8,9 @@ use crate::{Axis, Colour, Dash, Figure, Trace, indices_keeping_extremes};
 
 /// Points of a cloud: enough for its shape.
 const CLOUD_POINTS: usize = 800;
-/// Groups whose means are drawn over the cloud.
-const GROUPS: usize = 12;
+/// Stripes of the cloud whose means are drawn over it, and the points that one needs.
+const STRIPES: usize = 12;
+const LEAST_IN_STRIPE: f64 = 3.0;
 /// Points per line of the strip.
 const STRIP_POINTS: usize = 1_000;
 
@@ -37,18 +38,21 @@ pub(crate) fn partial_figure(evidence: &Evidence) -> Option<Figure> {
         .collect();
     let (scale, unit) = readable(points.iter().flatten(), &evidence.unit);
     points.iter_mut().flatten().for_each(|value| *value *= scale);
-    let least = points.iter().map(|point| point[0]).fold(f64::INFINITY, f64::min);
-    let greatest = points.iter().map(|point| point[0]).fold(f64::NEG_INFINITY, f64::max);
-    let width = greatest - least;
-    if width.is_nan() || width <= 0.0 {
+    if points.is_empty() {
+        return None;
+    }
+    // The line starts where nothing is predicted, so that a constant prediction has its place too.
+    let least = points.iter().map(|point| point[0]).fold(0.0, f64::min);
+    let greatest = points.iter().map(|point| point[0]).fold(0.0, f64::max);
+    if least >= greatest {
         return None;
     }
     let cloud: Vec<[f64; 2]> =
         even_sample(points.len(), CLOUD_POINTS).into_iter().map(|index| points[index]).collect();
     let column =
         |points: &[[f64; 2]], axis: usize| points.iter().map(|point| point[axis]).collect::<Vec<f64>>();
-    let means = group_means(points, GROUPS);
     let ends = [least, greatest];
+    let means = stripe_means(&points, ends);
     Some(
         Figure::new(Axis::new("predicted by the finding", &unit), Axis::new("left without it", &unit))
             .height(340)
@@ -75,14 +79,17 @@ pub(crate) fn partial_figure(evidence: &Evidence) -> Option<Figure> {
     )
 }
 
-/// The means of groups of equal size, in the order of the first coordinate.
-fn group_means(mut points: Vec<[f64; 2]>, groups: usize) -> Vec<[f64; 2]> {
-    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let size = points.len().div_ceil(groups).max(1);
-    let mean = |group: &[[f64; 2]], axis: usize| {
-        group.iter().map(|point| point[axis]).sum::<f64>() / group.len() as f64
-    };
-    points.chunks(size).map(|group| [mean(group, 0), mean(group, 1)]).collect()
+/// The means of the points in stripes of equal width between `least` and `greatest`, where there are enough.
+fn stripe_means(points: &[[f64; 2]], [least, greatest]: [f64; 2]) -> Vec<[f64; 2]> {
+    let mut sums = [[0.0; 3]; STRIPES];
+    for &[x, y] in points {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the stripes")]
+        let stripe = ((x - least) / (greatest - least) * STRIPES as f64) as usize;
+        let sum = &mut sums[stripe.min(STRIPES - 1)];
+        *sum = [sum[0] + x, sum[1] + y, sum[2] + 1.0];
+    }
+    let enough = sums.iter().filter(|[_, _, count]| *count >= LEAST_IN_STRIPE);
+    enough.map(|[x, y, count]| [x / count, y / count]).collect()
 }
 
 /// Log-likelihood gained per half second, and summed; intervals in which the finding acts are shaded.
@@ -92,8 +99,8 @@ pub(crate) fn strip_figure(evidence: &[&Evidence], acts_s: &[[f64; 2]]) -> Optio
     if known.is_empty() {
         return None;
     }
-    let mut figure = Figure::new(Axis::new("time", "s"), Axis::new("gain per half second", "nat"))
-        .row(Axis::new("summed", "nat"))
+    let mut figure = Figure::new(Axis::new("time", "s"), Axis::new("gain", "nat"))
+        .row(Axis::new("sum", "nat"))
         .height(360);
     let highest = known.iter().map(|evidence| top(evidence)).fold(0.0, f64::max);
     let shades: Vec<Vec<[f64; 2]>> = acts_s
@@ -140,15 +147,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn group_means_follow_a_line_through_noise() {
-        let points: Vec<[f64; 2]> = (0..1_000)
+    fn means_of_stripes_follow_a_line_through_noise() {
+        // 1200 points in twelve stripes; the noise of two neighbours cancels.
+        let points: Vec<[f64; 2]> = (0..1_200)
             .map(|i| {
-                let x = f64::from(i % 100);
+                let x = f64::from(i / 2) / 100.0;
                 [x, 2.0 * x + if i % 2 == 0 { 50.0 } else { -50.0 }]
             })
             .collect();
-        let means = group_means(points, 10);
-        assert_eq!(means.len(), 10);
+        let means = stripe_means(&points, [0.0, 6.0]);
+        assert_eq!(means.len(), STRIPES);
         assert!(means.iter().all(|[x, y]| (y - 2.0 * x).abs() < 1e-9), "{means:?}");
     }
 }

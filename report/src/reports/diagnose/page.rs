@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 
 use super::data::{Claim, DiagnoseReport, Found};
 use super::words::{
-    capital, heading, how_sure, joined, metres, overview, place, prediction, rivals, robots, sentence,
+    capital, heading, how_sure, joined, mean_per_100_m, metres, overview, particulars, place, prediction,
+    rivals, robots, sentence,
 };
 use crate::figures::diagnose::chain_drawing;
 use crate::number::duration;
 use crate::{Card, Document, Table};
 
 /// Findings whose sentences open the page.
-const OPENING: usize = 4;
+const OPENING: usize = 3;
 
 /// Adds page one.
 pub(super) fn page_one(report: &DiagnoseReport, document: Document) -> Document {
@@ -44,11 +45,15 @@ fn facts(report: &DiagnoseReport, document: Document) -> Document {
     } else {
         report.test_on.join(", ")
     };
-    document
+    let document = document
         .fact(which, names.join(", "))
         .fact("Robots", report.robots.len().to_string())
         .fact("Fitted on", report.fit_on.join(", "))
-        .fact("Tested on", tested)
+        .fact("Tested on", tested);
+    match mean_per_100_m(report) {
+        Some(error) => document.fact("Error per 100 m driven", error),
+        None => document,
+    }
 }
 
 fn chain_caption(report: &DiagnoseReport) -> String {
@@ -76,7 +81,7 @@ fn chain_caption(report: &DiagnoseReport) -> String {
 
 fn card(number: usize, finding: &Found, report: &DiagnoseReport) -> Card {
     Card::new(finding.claim.tone(), finding.claim.badge(), heading(number, finding, &report.robots))
-        .sentence(sentence(finding, &report.robots))
+        .sentence(particulars(finding, &report.robots))
         .particular("How sure", how_sure(finding))
         .particular("Rivals", rivals(finding))
         .particular("Where it acts", place(finding))
@@ -86,8 +91,8 @@ fn card(number: usize, finding: &Found, report: &DiagnoseReport) -> Card {
 }
 
 fn per_100_m(report: &DiagnoseReport) -> Table {
-    let caption = "Error of dead reckoning per 100 m driven, before and after: root mean square, from roll-outs over the \
-                   longest horizon. With findings on several recordings, over all of them.";
+    let caption = "Error of dead reckoning per 100 m driven, root mean square, from roll-outs over the longest \
+                   horizon.";
     let mut table =
         Table::new(caption, ["Robot", "Nominal model", "Corrected model", "Of the error remains"]).numeric();
     for own in &report.roll_outs {

@@ -24,6 +24,16 @@ impl Claim {
         }
     }
 
+    /// After a number of findings.
+    fn counted(self) -> &'static str {
+        match self {
+            Self::CannotTell => "with several explanations that these data cannot tell apart",
+            Self::Unnameable => "that no known effect explains",
+            Self::BadData => "of bad data",
+            other => other.badge(),
+        }
+    }
+
     pub(super) fn tone(self) -> Tone {
         match self {
             Self::NothingMissing => Tone::Good,
@@ -91,48 +101,59 @@ pub(super) fn either(finding: &Found) -> String {
     format!("cannot tell {} from {}", finding.title, joined(&finding.rivals, "or"))
 }
 
-/// The sentences of a finding, led by whose they are.
+/// What a finding amounts to, led by whose it is.
 pub(super) fn sentence(finding: &Found, all: &[RobotId]) -> String {
+    let says = if finding.claim == Claim::CannotTell { either(finding) } else { says(finding) };
+    format!("{}: {says}.", capital(&robots(&finding.robots, all)))
+}
+
+/// The same below a heading that has said what cannot be told apart.
+pub(super) fn particulars(finding: &Found, all: &[RobotId]) -> String {
+    if finding.claim != Claim::CannotTell || finding.sentences.is_empty() {
+        return sentence(finding, all);
+    }
+    format!("If it is {}: {}.", finding.title, says(finding))
+}
+
+fn says(finding: &Found) -> String {
     let says =
         if finding.sentences.is_empty() { finding.title.clone() } else { finding.sentences.join("; ") };
-    let says = match finding.claim {
-        Claim::CannotTell => format!("{}. If it is the first, {says}", either(finding)),
-        _ => says,
-    };
-    let says = says.trim_end_matches('.');
-    format!("{}: {says}.", capital(&robots(&finding.robots, all)))
+    says.trim_end_matches('.').to_owned()
 }
 
 /// How sure, in words and numbers.
 pub(super) fn how_sure(finding: &Found) -> String {
     let chance = if !finding.p_familywise.is_finite() {
-        "The chance of finding anything as strong in clean data was not computed.".to_owned()
+        "The probability of a false alarm was not computed.".to_owned()
     } else if finding.p_familywise < LEAST_PROBABILITY {
-        "Clean data show anything as strong with a probability below 1e-12, everything tried counted."
-            .to_owned()
+        "Probability of a false alarm below 1e-12.".to_owned()
     } else {
-        let p = quantity(finding.p_familywise, "");
-        format!("Clean data show anything as strong with a probability of {p}, everything tried counted.")
+        format!("Probability of a false alarm {}.", plain(finding.p_familywise))
     };
     let [gain, error] = finding.gain;
     if !gain.is_finite() {
-        return format!("{chance} It was not tested on data that the fit did not see.");
+        return format!("{chance} Not tested on data that the fit did not see.");
     }
     let times = if error > 0.0 && error.is_finite() {
-        format!(" ({} standard errors)", quantity(gain / error, ""))
+        format!(" ({} standard errors)", plain(gain / error))
     } else {
         String::new()
     };
-    let gained = format!(
-        "On data that the fit did not see, the log score changes by {} ± {}{times}.",
-        signed(gain),
-        quantity(error, "")
-    );
-    format!("{chance} {gained} {}", standing(finding))
+    let sign = if gain > 0.0 { "+" } else { "" };
+    let (gain, error) = (plain(gain), plain(error));
+    format!(
+        "{chance} Log score on data that the fit did not see {sign}{gain} ± {error}{times}. {}",
+        standing(finding)
+    )
 }
 
-fn signed(value: f64) -> String {
-    if value > 0.0 { format!("+{}", quantity(value, "")) } else { quantity(value, "") }
+/// Three significant digits, without zeros at the end.
+fn plain(value: f64) -> String {
+    let text = quantity(value, "");
+    if text.contains('.') && !text.contains('e') {
+        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    }
+    text.replace(".00e", "e")
 }
 
 /// Whether the gain on unseen data exceeds twice its standard error.
@@ -173,14 +194,14 @@ pub(super) fn place(finding: &Found) -> String {
             .time_s
             .iter()
             .take(4)
-            .map(|[from, to]| format!("{}..{} s", quantity(*from, ""), quantity(*to, "")))
+            .map(|[from, to]| format!("{}..{} s", plain(*from), plain(*to)))
             .collect();
         let more = finding.time_s.len().saturating_sub(4);
         let rest = if more > 0 { format!(" and {more} more intervals") } else { String::new() };
         parts.push(format!("at {}{rest}", shown.join(", ")));
     }
     if let Some([x0, x1, y0, y1]) = finding.region_m {
-        let at = |value: f64| quantity(value, "");
+        let at = plain;
         parts.push(format!("where x is {}..{} m and y is {}..{} m", at(x0), at(x1), at(y0), at(y1)));
     }
     if parts.is_empty() {
@@ -199,15 +220,24 @@ pub(super) fn prediction(roll_outs: &[HorizonError]) -> String {
     };
     let [nominal, refitted, corrected] = own.position_m.map(metres);
     format!(
-        "After {} of driving blind the predicted position is off by {nominal} (nominal model), {refitted} (its own \
+        "After {} s of driving blind the predicted position is off by {nominal} (nominal model), {refitted} (its own \
          parameters refitted), {corrected} (corrected).",
-        quantity(own.horizon_s, "s")
+        plain(own.horizon_s)
     )
 }
 
 /// Millimetres below 10 cm.
 pub(super) fn metres(value: f64) -> String {
     if value.abs() < 0.1 { quantity(1e3 * value, "mm") } else { quantity(value, "m") }
+}
+
+/// The mean error per 100 m over the robots for which it is known, before and after.
+pub(super) fn mean_per_100_m(report: &DiagnoseReport) -> Option<String> {
+    let known = || report.roll_outs.iter().filter(|own| own.per_100_m.iter().all(|error| error.is_finite()));
+    let count = known().count();
+    let mean = |which: usize| known().map(|own| own.per_100_m[which]).sum::<f64>() / count as f64;
+    let of = if count > 1 { format!(" (mean of {count} robots)") } else { String::new() };
+    (count > 0).then(|| format!("{} before, {} after{of}", metres(mean(0)), metres(mean(1))))
 }
 
 /// What the page begins with.
@@ -228,7 +258,7 @@ pub(super) fn overview(report: &DiagnoseReport) -> String {
                 .into_iter()
                 .map(|claim| (claim, report.findings.iter().filter(|finding| finding.claim == claim).count()))
                 .filter(|(_, count)| *count > 0)
-                .map(|(claim, count)| format!("{count} {}", claim.badge()))
+                .map(|(claim, count)| format!("{count} {}", claim.counted()))
                 .collect();
             format!("{findings}: {}.", joined(&counted, "and"))
         }
