@@ -10,23 +10,32 @@
 
 mod actuator;
 mod body;
+mod builtin;
 mod channel;
+mod commanded;
 mod compare;
 mod diagnose;
+mod diagnosis;
 mod error;
 mod evidence;
 mod findings;
+mod gyro;
 mod model;
+mod plan;
+mod reckoning;
 mod residual;
 mod sensors;
+mod sightings;
 mod summary;
 mod track;
 mod view;
 mod windows;
 
+pub use builtin::models;
 pub use channel::{Channel, Component, MAX_COMPONENTS};
-pub use compare::{ChannelComparison, RobotComparison, compare, residuals};
+pub use compare::{ChannelComparison, RobotComparison, compare, end_to_end, residuals, residuals_of};
 pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, diagnose};
+pub use diagnosis::probe;
 pub use error::MismatchError;
 pub use evidence::Evidence;
 pub use findings::{

@@ -11,9 +11,10 @@ use crate::scalar::Scalar;
 pub const MAX_PARAMETERS: usize = 6;
 
 /// How wheels make a body move.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Drive {
     /// Two driven wheels.
+    #[default]
     Differential,
     /// Wheels that skid in turns: a differential drive whose effective track is wider by this ratio
     /// (`goel1999`; 1.5 to 1.75 is usual).
@@ -66,7 +67,7 @@ impl Scope {
 }
 
 /// An effect with values for its parameters.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActiveEffect<S> {
     effect: Effect,
     values: [S; MAX_PARAMETERS],
@@ -147,7 +148,7 @@ pub enum Variable {
 }
 
 /// A robot: its drive, its nominal parameters and the effects that act on it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RobotModel<S> {
     /// How wheels make the body move.
     pub drive: Drive,

@@ -4,24 +4,32 @@
 //! [`open`] tells the forms apart by what a folder holds and returns the recording together with an
 //! [`IngestReport`]: whatever was dropped, reordered or missing is counted there. Damaged input is an
 //! error naming file and line unless [`ReadOptions::skip_bad_rows`] is set.
+//!
+//! A model of the robots (`nominal.toml`, and `corrected.toml` with effects in it) is read by [`read_model`]
+//! and becomes a physical model by [`Nominal::model`].
 
+mod effect_spec;
 mod error;
 mod folder;
 mod ingest;
+mod model;
 mod mrclam;
 mod nominal;
 mod number;
 mod open;
 mod report;
+mod suggest;
 mod table;
 mod tidy;
 pub mod tum;
 mod types;
 mod view;
 
+pub use effect_spec::{DeclaredEffect, EffectSpec, ScopeSpec, SpecError};
 pub use error::RecordingError;
 pub use folder::{FORMAT_VERSION, Overwrite, read_folder, write_folder};
 pub use ingest::ReadOptions;
+pub use model::{nominal_model, read_model, write_model};
 pub use mrclam::read_mrclam;
 pub use nominal::{read_nominal, write_nominal};
 pub use open::open;

@@ -1,5 +1,7 @@
 //! Reads and writes `nominal.toml`: what the nominal simulation believes.
 
+mod extras;
+
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
@@ -16,6 +18,8 @@ const VERSION: i64 = 1;
 /// The one model the nominal simulation knows.
 const MODEL: &str = "ideal_unicycle";
 const RATE_SUFFIX: &str = "_rate_hz";
+/// The first line of a nominal model.
+pub(crate) const COMMENT: &str = "What the nominal simulation believes. SI units, radians.";
 
 /// What a key without an entry means.
 #[derive(Clone, Copy)]
@@ -137,6 +141,7 @@ pub fn read_nominal(path: &Path, warnings: &mut Vec<String>) -> Result<Option<No
     let noise = reader.section(&table, "noise", "noise", NOISE, |_, _, _| Ok(false))?;
     let range_sensor =
         reader.section(&table, "range_sensor", "range_sensor", RANGE_SENSOR, |_, _, _| Ok(false))?;
+    let team_drive = extras::drive(&table).map_err(|wrong| reader.wrong("", wrong))?;
     let robots_table = reader.table(&table, "robots", "robots")?;
     let mut robots = BTreeMap::new();
     for name in robots_table.keys() {
@@ -144,16 +149,21 @@ pub fn read_nominal(path: &Path, warnings: &mut Vec<String>) -> Result<Option<No
         let robot: RobotId = robot_of(name).ok_or_else(|| {
             reader.refused(&section, "this name".to_owned(), "a robot's section, such as robots.r1")
         })?;
-        let read: NominalRobot = reader.section(robots_table, name, &section, ROBOT, read_rate)?;
+        let mut read: NominalRobot = reader.section(robots_table, name, &section, ROBOT, read_rate)?;
+        let own = reader.table(robots_table, name, &section)?;
+        let drive = extras::drive(own).map_err(|wrong| reader.wrong(&section, wrong))?;
+        read.drive = drive.or(team_drive).unwrap_or_default();
+        read.effects = extras::effects(own).map_err(|wrong| reader.wrong(&section, wrong))?;
         robots.insert(robot, read);
     }
     Ok(Some(Nominal { noise, range_sensor, robots }))
 }
 
-/// Channel rates go by the suffix of their keys; `Ok(false)` for any other key.
+/// Channel rates go by the suffix of their keys; drive and effects are read apart; `Ok(false)` for any other
+/// key.
 fn read_rate(robot: &mut NominalRobot, key: &str, value: &Value) -> Result<bool, Domain> {
     if !key.ends_with(RATE_SUFFIX) {
-        return Ok(false);
+        return Ok(key == extras::EFFECTS || extras::DRIVE.contains(&key));
     }
     let rate = number(value).filter(|&rate| Domain::NotNegative.holds(rate)).ok_or(Domain::NotNegative)?;
     robot.rates_hz.insert(key.to_owned(), rate);
@@ -165,16 +175,27 @@ fn read_rate(robot: &mut NominalRobot, key: &str, value: &Value) -> Result<bool,
 /// # Errors
 /// A value is outside its range, or the file system refuses.
 pub fn write_nominal(path: &Path, nominal: &Nominal, duration_s: f64) -> Result<(), RecordingError> {
-    let text = nominal_text(nominal, duration_s).map_err(|reason| RecordingError::Unwritable { reason })?;
+    let text = nominal_text(nominal, COMMENT, Some(duration_s))
+        .map_err(|reason| RecordingError::Unwritable { reason })?;
     write_whole(path, &text)
 }
 
 /// The text of `nominal.toml`, or which value cannot be written.
-pub(crate) fn nominal_text(nominal: &Nominal, duration_s: f64) -> Result<String, String> {
-    let mut text = format!(
-        "# What the nominal simulation believes. SI units, radians.\nformat_version = {VERSION}\n\
-         duration_s = {duration_s:?}\nmodel = \"{MODEL}\"\n"
-    );
+pub(crate) fn nominal_text(
+    nominal: &Nominal,
+    comment: &str,
+    duration_s: Option<f64>,
+) -> Result<String, String> {
+    let mut text = String::new();
+    // Writing to a string cannot fail, here and below.
+    for line in comment.lines() {
+        let _ = writeln!(text, "{}", format!("# {line}").trim_end());
+    }
+    let _ = writeln!(text, "format_version = {VERSION}");
+    if let Some(duration_s) = duration_s {
+        let _ = writeln!(text, "duration_s = {duration_s:?}");
+    }
+    let _ = writeln!(text, "model = \"{MODEL}\"");
     push_section(&mut text, "noise", NOISE, &nominal.noise)?;
     push_section(&mut text, "range_sensor", RANGE_SENSOR, &nominal.range_sensor)?;
     // Says that the section is there even when it is empty.
@@ -187,9 +208,9 @@ pub(crate) fn nominal_text(nominal: &Nominal, duration_s: f64) -> Result<String,
             if !bare || !key.ends_with(RATE_SUFFIX) || !Domain::NotNegative.holds(*rate) {
                 return Err(format!("nominal `{section}.{key}` = {rate} is not a channel's rate"));
             }
-            // Writing to a string cannot fail.
             let _ = writeln!(text, "{key} = {rate:?}");
         }
+        extras::push(&mut text, &section, values.drive, &values.effects)?;
     }
     Ok(text)
 }
@@ -201,7 +222,6 @@ fn push_section<T: Clone>(
     values: &T,
 ) -> Result<(), String> {
     let mut values = values.clone();
-    // Writing to a string cannot fail, here and below.
     let _ = writeln!(text, "\n[{section}]");
     for key in keys {
         let value = *(key.field)(&mut values);
@@ -226,6 +246,11 @@ impl Reader<'_> {
         RecordingError::BadKey { file, key, found, expected }
     }
 
+    fn wrong(&self, section: &str, wrong: extras::Wrong) -> RecordingError {
+        let key = [section, &wrong.key].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>();
+        self.refused(&key.join("."), wrong.found, &wrong.expected)
+    }
+
     fn unknown(&mut self, key: &str) {
         self.warnings.push(format!("{}: key `{key}` is not known and was not read", self.file));
     }
@@ -244,6 +269,7 @@ impl Reader<'_> {
                     Domain::NotNegative.description().to_owned()
                 }
                 "format_version" | "model" | "duration_s" | "noise" | "range_sensor" | "robots" => continue,
+                key if extras::DRIVE.contains(&key) => continue,
                 _ => {
                     self.unknown(key);
                     continue;

@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::{LandmarkId, Pose2, RobotId, Timestamp};
+use pleiad_physics::Drive;
+
+use crate::effect_spec::DeclaredEffect;
 
 /// What a team of robots recorded.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -126,6 +129,10 @@ pub struct NominalRobot {
     pub clock_drift_ppm: f64,
     /// Declared channel rates in Hz, by the key's name (`gps_rate_hz`); 0 where the channel is absent.
     pub rates_hz: BTreeMap<String, f64>,
+    /// How the wheels make the robot move.
+    pub drive: Drive,
+    /// What acts on the robot besides: none in a nominal model, what was found in a corrected one.
+    pub effects: Vec<DeclaredEffect>,
 }
 
 impl RobotRecording {

@@ -13,7 +13,7 @@ use super::{
     RELATIVE, TRUTH, VELOCITY, WHEELS, robot_folder, robots_of, sightings,
 };
 use crate::error::RecordingError;
-use crate::nominal::nominal_text;
+use crate::nominal::{COMMENT, nominal_text};
 use crate::number::{push_number, push_time, time_text};
 use crate::open::forms_of;
 use crate::report::Form;
@@ -119,7 +119,7 @@ fn render(recording: &Recording) -> Result<Vec<(String, String)>, String> {
     }
     files.push((LANDMARKS.to_owned(), landmarks));
     if let Some(nominal) = &recording.nominal {
-        files.push((NOMINAL.to_owned(), nominal_text(nominal, duration_s(recording))?));
+        files.push((NOMINAL.to_owned(), nominal_text(nominal, COMMENT, Some(duration_s(recording)))?));
     }
     for (&robot, channels) in &recording.robots {
         let mut rows = BTreeMap::new();

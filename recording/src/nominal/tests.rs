@@ -1,3 +1,5 @@
+use pleiad_physics::Drive;
+
 use super::*;
 
 /// As in the sample recordings, shortened to one robot.
@@ -93,6 +95,66 @@ fn what_is_written_reads_back_equal() {
     assert_eq!(warnings, Vec::<String>::new());
 }
 
+const EFFECT: &str = "
+[[robots.r2.effects]]
+name = \"track_width_error\"
+parameters = { relative = 0.01 }
+";
+
+#[test]
+fn effects_of_a_robot_are_read_in_their_order_and_reach_its_model() {
+    let second = EFFECT.replace("track_width_error", "wheel_radius_error");
+    let (nominal, warnings) = read(&format!("{SAMPLE}{EFFECT}{second}")).expect("sound");
+    assert_eq!(warnings, Vec::<String>::new());
+    let model = nominal.model(RobotId(2)).expect("it is in the file");
+    let found: Vec<_> = model.effects.iter().map(|own| (own.effect().name(), own.values()[0])).collect();
+    assert_eq!(found, [("track_width_error", 0.01), ("wheel_radius_error", 0.01)]);
+    assert_eq!((model.nominal.wheel_radius, model.nominal.range_bias_m), (0.08847, -0.0486));
+    assert_eq!(nominal.model(RobotId(1)), None);
+}
+
+#[test]
+fn a_drive_holds_for_the_team_unless_a_robot_has_its_own() {
+    let team = SAMPLE.replacen("[noise]", "drive = \"skid_steer\"\ntrack_ratio = 1.6\n\n[noise]", 1);
+    let drive = |text: &str| read(text).expect("sound").0.robots[&RobotId(2)].drive;
+    assert_eq!(drive(SAMPLE), Drive::Differential);
+    assert_eq!(drive(&team), Drive::SkidSteer { track_ratio: 1.6 });
+    assert_eq!(
+        drive(&format!("{team}drive = \"car_like\"\nwheelbase_m = 0.5\n")),
+        Drive::CarLike { wheelbase_m: 0.5 }
+    );
+    assert_eq!(read(&team).expect("sound").1, Vec::<String>::new());
+}
+
+#[test]
+fn a_corrected_model_reads_back_equal_and_alone() {
+    let (mut nominal, _) = read(&format!("{SAMPLE}{EFFECT}")).expect("sound");
+    let robot = nominal.robots.get_mut(&RobotId(2)).expect("it is in the file");
+    robot.drive = Drive::CarLike { wheelbase_m: 0.45 };
+    robot.effects[0].ci95 = vec![Some([0.009, 0.011])];
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("corrected.toml");
+    crate::write_model(&path, &nominal, "Found by hand.\n\nTwice.").expect("writable");
+    let text = std::fs::read_to_string(&path).expect("written");
+    assert!(text.starts_with("# Found by hand.\n#\n# Twice.\nformat_version = 1\n"), "{text}");
+    let mut warnings = Vec::new();
+    assert_eq!(crate::read_model(&path, &mut warnings).expect("readable"), nominal);
+    assert_eq!(warnings, Vec::<String>::new());
+    let missing = crate::read_model(&folder.path().join("corected.toml"), &mut warnings);
+    let error = missing.expect_err("there is no such file").to_string();
+    assert!(error.contains("corected.toml is missing") && error.contains("corrected.toml"), "{error}");
+}
+
+#[test]
+fn a_model_that_could_not_be_read_back_is_not_written() {
+    let (mut nominal, _) = read(&format!("{SAMPLE}{EFFECT}")).expect("sound");
+    let robot = nominal.robots.get_mut(&RobotId(2)).expect("it is in the file");
+    robot.effects[0].active.set("relative", f64::NAN).expect("it has the parameter");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let error = crate::write_model(&folder.path().join("corrected.toml"), &nominal, "").expect_err("NaN");
+    assert!(error.to_string().contains("robots.r2.effects[0].parameters.relative"), "{error}");
+}
+
 #[test]
 fn a_missing_file_is_no_nominal() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -139,6 +201,20 @@ fn a_wrong_or_missing_key_is_an_error_naming_file_and_key() {
         ("ideal_unicycle", "ackermann", "key `model`: found `\"ackermann\"`"),
         ("format_version = 1", "format_version = 9", "key `format_version`: found `9`"),
         ("[noise]", "[noise", "is not valid TOML"),
+        ("[noise]", "drive = \"legs\"\n[noise]", "key `drive`: found `\"legs\"`, expected \"differential\""),
+        ("[noise]", "track_ratio = 1.5\n[noise]", "key `track_ratio`: found `1.5`, expected the key `drive`"),
+        ("[robots.r2]", "[robots.r2]\ndrive = \"skid_steer\"", "key `robots.r2.track_ratio`: found nothing"),
+        ("[robots.r2]", "[robots.r2]\neffects = 3", "key `robots.r2.effects`: found `3`, expected a list"),
+        (
+            "[robots.r2]",
+            "[robots.r2]\neffects = [{ name = \"crab\" }]",
+            "key `robots.r2.effects[0]`: found an effect that cannot be read (missing field `parameters`",
+        ),
+        (
+            "[robots.r2]",
+            "[robots.r2]\neffects = [{ name = \"crab\", parameters = { rad = nan } }]",
+            "key `robots.r2.effects[0].parameters.rad`: found `nan`",
+        ),
     ] {
         assert!(SAMPLE.contains(from), "{from}");
         let error = read(&SAMPLE.replacen(from, to, 1)).expect_err(to);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use pleiad_estimation::Timestamp;
 use pleiad_mismatch::Diagnosis;
-use pleiad_recording::{Nominal, Recording, RobotRecording, write_nominal};
+use pleiad_recording::{Nominal, Recording, RobotRecording, write_model};
 
 /// Writes the robots of all recordings into one model. Of a robot that the recordings model differently, the
 /// first is written and the difference remarked.
@@ -26,8 +26,13 @@ pub(super) fn write(diagnosis: &mut Diagnosis, recordings: &[Recording], path: &
         }
     }
     diagnosis.findings.notes.extend(notes);
-    let longest = recordings.iter().map(seconds).fold(0.0, f64::max);
-    Ok(write_nominal(path, &whole, longest)?)
+    let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
+    let comment = format!(
+        "The nominal model of {} with what `pleiad diagnose` found in it. SI units, radians.\nIntervals hold 95 %; \
+         findings.json says how sure each is.",
+        names.join(", ")
+    );
+    Ok(write_model(path, &whole, &comment)?)
 }
 
 /// From the first to the last sample of any channel.

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use pleiad_mismatch::{DiagnoseOptions, TruthUse, diagnose};
-use pleiad_recording::{Nominal, ReadOptions, Recording, read_nominal};
+use pleiad_recording::{Nominal, ReadOptions, Recording, read_model};
 use pleiad_report::{diagnose_report, write_summary};
 
 use crate::cli::{DiagnoseArgs, TruthArg};
@@ -54,11 +54,11 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
 
 fn model(path: &Path) -> anyhow::Result<Nominal> {
     let mut warnings = Vec::new();
-    let model = read_nominal(path, &mut warnings)?;
+    let model = read_model(path, &mut warnings).with_context(|| format!("--model {}", path.display()))?;
     for warning in warnings {
         tracing::warn!("--model {}: {warning}", path.display());
     }
-    model.with_context(|| format!("--model {}: there is no such file", path.display()))
+    Ok(model)
 }
 
 fn read(
