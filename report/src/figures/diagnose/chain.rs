@@ -15,8 +15,8 @@ const BOX: f64 = 84.0;
 const HEAD: f64 = 44.0;
 const ROW: f64 = 40.0;
 const MARK: f64 = 13.0;
-/// From this many robots on, only those with findings are drawn.
-const MANY: usize = 12;
+/// Of more robots than this, only those with findings are drawn.
+pub(crate) const MANY: usize = 12;
 /// Marks side by side in a cell; more are counted.
 const MARKS: usize = 3;
 

@@ -7,7 +7,7 @@ mod residuals;
 mod roll_outs;
 mod scale;
 
-pub(crate) use chain::chain_drawing;
+pub(crate) use chain::{MANY, chain_drawing};
 pub(crate) use evidence::{name_of, partial_figure, strip_figure};
 pub(crate) use floor::{gain_floor, residual_floors};
 pub(crate) use residuals::{series_panels, spread_figure};

@@ -7,7 +7,7 @@ use super::words::{
     capital, heading, how_sure, joined, mean_per_100_m, metres, overview, particulars, place, prediction,
     rivals, robots, sentence,
 };
-use crate::figures::diagnose::chain_drawing;
+use crate::figures::diagnose::{MANY, chain_drawing};
 use crate::number::duration;
 use crate::{Card, Document, Table};
 
@@ -73,8 +73,9 @@ fn chain_caption(report: &DiagnoseReport) -> String {
     }
     shapes.push("dot: tested, nothing found".to_owned());
     let numbers = if report.findings.is_empty() { "" } else { " Numbers are those of the findings." };
+    let left_out = if report.robots.len() > MANY { " Robots without a finding are left out." } else { "" };
     format!(
-        "From command to reading: where on which robot something is missing.{numbers} {}.",
+        "From command to reading: where on which robot something is missing.{numbers} {}.{left_out}",
         capital(&shapes.join("; "))
     )
 }
