@@ -1,14 +1,15 @@
 //! The wheels against the servo that follows the commands.
 
 use pleiad_estimation::RobotId;
-use pleiad_physics::chain::actuator::{ActuatorState, Command, schedule};
+use pleiad_physics::chain::actuator::{ActuatorState, Command};
 use pleiad_physics::predict::{CommandWindow, wheel_turns};
-use pleiad_physics::{Chance, Pose, RobotModel, Scalar};
+use pleiad_physics::{Pose, RobotModel, Scalar};
 
 use crate::channel::Channel;
 use crate::evidence::Evidence;
 use crate::plan::Plan;
 use crate::residual::{ChannelResiduals, Omission, Regime, Residual};
+use crate::schedule::Schedule;
 use crate::track::{Track, motion};
 use crate::windows::windows;
 
@@ -104,13 +105,13 @@ pub(crate) fn residuals<S: Scalar>(
     model: &RobotModel<S>,
 ) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(Channel::Actuator, plan);
-    let scheduled = schedule(model, &track.commands, |_| Chance::EXPECTED);
+    let mut schedule = Schedule::new(model, &track.commands);
     let mut state = ActuatorState::default();
     for own in &plan.items {
         if let Some(before) = &own.before {
-            wheel_turns(model, &scheduled, before, &mut state);
+            wheel_turns(model, schedule.within(before), before, &mut state);
         }
-        let predicted = wheel_turns(model, &scheduled, &own.window, &mut state);
+        let predicted = wheel_turns(model, schedule.within(&own.window), &own.window, &mut state);
         let Some(measured) = own.measured else { continue };
         let [left, right] = [0, 1].map(|wheel| -predicted[wheel] + measured[wheel]);
         let middle_s = f64::midpoint(own.window.from_s, own.window.to_s);

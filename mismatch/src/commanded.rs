@@ -1,11 +1,10 @@
 //! The true motion against the whole chain driven by the commands, for recordings without encoders.
 
 use pleiad_estimation::RobotId;
-use pleiad_physics::chain::actuator::{Scheduled, schedule};
 use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::chain::robot::Robot;
 use pleiad_physics::predict::{CommandWindow, commanded_truth_change, wheel_turns};
-use pleiad_physics::{Chance, Pose, RobotModel, Scalar};
+use pleiad_physics::{Pose, RobotModel, Scalar};
 
 use crate::actuator::SETTLING_S;
 use crate::body::difference;
@@ -13,6 +12,7 @@ use crate::channel::Channel;
 use crate::evidence::Evidence;
 use crate::plan::Plan;
 use crate::residual::{ChannelResiduals, Omission, Regime, Residual};
+use crate::schedule::Schedule;
 use crate::track::{Track, motion};
 use crate::windows::windows;
 
@@ -27,7 +27,7 @@ const UNKNOWN_S: f64 = 1.0;
 pub(crate) struct Motion {
     /// From where the window before ended to where this begins: nothing is compared, the servo goes on.
     before: Option<CommandWindow>,
-    window: CommandWindow,
+    pub(crate) window: CommandWindow,
     pub(crate) middle_s: f64,
     regime: Regime,
     /// The true pose at the end, seen from the start.
@@ -111,23 +111,22 @@ fn whole_windows(lasted_s: f64, length_s: f64) -> usize {
 
 /// Rolls windows out in order, so that servo and body know how they stand.
 pub(crate) struct Driver<S> {
-    scheduled: Vec<Scheduled<S>>,
+    schedule: Schedule<S>,
     robot: Robot<S>,
 }
 
 impl<S: Scalar> Driver<S> {
     pub(crate) fn new(track: &Track, model: &RobotModel<S>) -> Self {
-        let scheduled = schedule(model, &track.commands, |_| Chance::EXPECTED);
-        Self { scheduled, robot: Robot::at_rest(Pose::identity()) }
+        Self { schedule: Schedule::new(model, &track.commands), robot: Robot::at_rest(Pose::identity()) }
     }
 
     /// What the model expects the reference system to see of a window.
     pub(crate) fn predicted(&mut self, model: &RobotModel<S>, own: &Motion) -> Pose<S> {
         if let Some(before) = &own.before {
-            wheel_turns(model, &self.scheduled, before, &mut self.robot.actuator);
+            wheel_turns(model, self.schedule.within(before), before, &mut self.robot.actuator);
             self.robot.body = BodyState::default();
         }
-        commanded_truth_change(model, &self.scheduled, &own.window, &mut self.robot)
+        commanded_truth_change(model, self.schedule.within(&own.window), &own.window, &mut self.robot)
     }
 }
 

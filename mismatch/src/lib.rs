@@ -24,6 +24,8 @@ mod model;
 mod plan;
 mod reckoning;
 mod residual;
+mod rollout;
+mod schedule;
 mod sensors;
 mod sightings;
 mod summary;
@@ -43,5 +45,6 @@ pub use findings::{
 };
 pub use model::{nominal_model, nominal_models};
 pub use residual::{ChannelResiduals, Omission, Regime, Residual};
+pub use rollout::{HORIZONS_S, Rollout, rollouts};
 pub use summary::{MIN_RESIDUALS, Summary, summarize};
 pub use view::{PartialResidual, Plots, ResidualSeries};

@@ -23,6 +23,8 @@ pub(crate) struct Reckoned {
 /// Steps joined into a path.
 #[derive(Clone, Debug)]
 pub(crate) struct Reckoning {
+    /// The stamps alone, because they are searched.
+    times_s: Vec<f64>,
     steps: Vec<(Step, Reckoned)>,
     /// A longer step is a pause: what happened in it is unknown, seconds.
     pause_s: f64,
@@ -37,7 +39,8 @@ impl Reckoning {
             here = advanced(&at, &step, 1.0);
             (step, at)
         });
-        Self { steps: steps.collect(), pause_s }
+        let steps: Vec<_> = steps.collect();
+        Self { times_s: steps.iter().map(|(step, _)| step.time_s).collect(), steps, pause_s }
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -46,19 +49,19 @@ impl Reckoning {
 
     /// The stamps of the first and the last sample, seconds.
     pub(crate) fn span_s(&self) -> Option<(f64, f64)> {
-        Some((self.steps.first()?.0.time_s, self.steps.last()?.0.time_s))
+        Some((*self.times_s.first()?, *self.times_s.last()?))
     }
 
     /// Odometry is nearly free of noise, so it may be interpolated. `None` outside the samples and in a
     /// pause.
     pub(crate) fn at(&self, time_s: f64) -> Option<Reckoned> {
-        let after = self.steps.partition_point(|(step, _)| step.time_s <= time_s);
+        let after = self.times_s.partition_point(|stamp_s| *stamp_s <= time_s);
         let (step, reckoned) = self.steps.get(after.checked_sub(1)?)?;
         let since_s = time_s - step.time_s;
         if since_s <= 0.0 {
             return Some(*reckoned);
         }
-        let step_s = self.steps.get(after)?.0.time_s - step.time_s;
+        let step_s = self.times_s.get(after)? - step.time_s;
         (step_s <= self.pause_s).then(|| advanced(reckoned, step, since_s / step_s))
     }
 }

@@ -18,7 +18,7 @@ const TRUTH_REACH_S: f64 = 0.1;
 /// A step between samples is a pause if it is longer than this many median steps.
 const PAUSE_FACTOR: f64 = 5.0;
 /// A step between commands is no gap up to this, seconds: a logger that is late now and then is usual.
-const SHORTEST_GAP_S: f64 = 0.25;
+const SHORTEST_GAP_S: f64 = 0.5;
 
 /// What a robot's odometry, its commands and the reference system recorded, in seconds from the origin.
 pub(crate) struct Track {

@@ -6,6 +6,7 @@ mod entries;
 mod fit;
 mod noise;
 mod parallel;
+mod refine;
 mod select;
 mod starts;
 mod term;

@@ -9,6 +9,7 @@ use crate::diagnosis::candidate::{Candidate, candidates};
 use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::fit::{Fit, fit};
 use crate::diagnosis::parallel;
+use crate::diagnosis::refine::refine;
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::Unit;
@@ -54,7 +55,8 @@ pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry]) -> Option<Selected>
     for _ in 0..MOST_TERMS {
         let scored = pool.scored(units, entries, &current);
         tests = tests.max(scored.len());
-        let added = additions(units, &current, &scored, tests);
+        let whites = whites(units, &current);
+        let added = additions(units, &whites, &current, &scored, tests);
         if added.is_empty() {
             break;
         }
@@ -91,7 +93,7 @@ impl Pool {
         self.known.extend(missing.into_iter().zip(found));
         let whites: Vec<White<'_, '_>> = whites(units, current);
         let scores = parallel::map(&open, |entry| {
-            self.known[entry].iter().filter_map(|candidate| score(&whites, candidate)).collect::<Vec<_>>()
+            self.known[entry].iter().filter_map(|candidate| score(units, &whites, candidate)).collect::<Vec<_>>()
         });
         scores.into_iter().flatten().collect()
     }
@@ -120,12 +122,22 @@ pub(crate) fn whites<'u, 'a>(units: &[&'u Unit<'a>], fit: &'u Fit) -> Vec<White<
     each.map(|((unit, state), columns)| White::new(unit, state, columns)).collect()
 }
 
-pub(crate) fn score(whites: &[White<'_, '_>], candidate: &Candidate) -> Option<Scored> {
-    let own: Vec<&White<'_, '_>> = candidate.columns.iter().map(|(unit, _)| &whites[*unit]).collect();
-    let columns: Vec<&[_]> = candidate.columns.iter().map(|(_, columns)| columns.as_slice()).collect();
-    let step = step(&own, &columns)?;
-    if candidate.along.is_empty() && !SOUND_STEP.contains(&step.change[0]) {
-        return None;
+pub(crate) fn score(
+    units: &[&Unit<'_>],
+    whites: &[White<'_, '_>],
+    candidate: &Candidate,
+) -> Option<Scored> {
+    let all = candidate.columns(units);
+    let own: Vec<&White<'_, '_>> = all.iter().map(|(unit, _)| &whites[*unit]).collect();
+    let columns: Vec<&[_]> = all.iter().map(|(_, columns)| columns.as_slice()).collect();
+    let mut step = step(&own, &columns)?;
+    if candidate.along.is_empty() {
+        // The effect is there as a whole or not at all: the gain is that of a step of one.
+        let change = step.change[0];
+        if !SOUND_STEP.contains(&change) {
+            return None;
+        }
+        step.gain *= (2.0 - 1.0 / change) / change;
     }
     let p = upper_tail(step.wald, step.change.len());
     Some(Scored { candidate: candidate.clone(), step, p })
@@ -170,7 +182,13 @@ fn significant(scored: &[Scored], tests: usize) -> Vec<&Scored> {
 }
 
 /// What to add: the best effect of the world, or each robot's best own one.
-fn additions(units: &[&Unit<'_>], current: &Fit, scored: &[Scored], tests: usize) -> Vec<Term> {
+fn additions(
+    units: &[&Unit<'_>],
+    whites: &[White<'_, '_>],
+    current: &Fit,
+    scored: &[Scored],
+    tests: usize,
+) -> Vec<Term> {
     let strong = significant(scored, tests);
     let shared: Vec<&Scored> =
         strong.iter().copied().filter(|one| one.candidate.term.whose == Whose::Everyone).collect();
@@ -183,7 +201,7 @@ fn additions(units: &[&Unit<'_>], current: &Fit, scored: &[Scored], tests: usize
     if let Some(gain) = best_shared
         && groups.values().all(|own| own[0].gain() < gain)
     {
-        return choose(units, current, &shared).into_iter().collect();
+        return choose(units, whites, current, &shared).into_iter().collect();
     }
     // A robot waits if what it shows may be its share of an effect of the world.
     let sharers = units.len().max(1) as f64;
@@ -191,12 +209,18 @@ fn additions(units: &[&Unit<'_>], current: &Fit, scored: &[Scored], tests: usize
         .into_values()
         .filter(|own| best_shared.is_none_or(|gain| own[0].gain() > 2.0 * gain / sharers))
         .collect();
-    parallel::map(&groups, |rivals| choose(units, current, rivals)).into_iter().flatten().collect()
+    parallel::map(&groups, |rivals| choose(units, whites, current, rivals)).into_iter().flatten().collect()
 }
 
 /// Fits the strongest rivals and gives the best of them, fitted.
-fn choose(units: &[&Unit<'_>], current: &Fit, rivals: &[&Scored]) -> Option<Term> {
+fn choose(
+    units: &[&Unit<'_>],
+    whites: &[White<'_, '_>],
+    current: &Fit,
+    rivals: &[&Scored],
+) -> Option<Term> {
     let fitted: Vec<Option<(f64, Term)>> = parallel::map(&rivals[..rivals.len().min(RIVALS)], |rival| {
+        let rival = refine(units, whites, rival);
         let added = fit_beside(units, current, rival.term())?;
         let term = added.terms.last()?.clone();
         let inflation = rival.step.inflation.max(1.0);

@@ -17,7 +17,9 @@ const ONSETS: usize = 24;
 /// Cells per side of the map in which a place is searched, coarse and fine.
 const CELLS: [usize; 3] = [2, 4, 7];
 /// Values of a threshold that are tried.
-const THRESHOLDS: usize = 14;
+const THRESHOLDS: usize = 40;
+/// Beyond every place and before every time.
+const EVERYWHERE: f64 = 1e9;
 /// Values of a delay or lag that are tried, seconds.
 const LAGS: [f64; 5] = [-0.02, 0.03, 0.08, 0.18, 0.4];
 
@@ -30,51 +32,73 @@ pub(crate) struct Start {
     pub(crate) along: Vec<usize>,
 }
 
+/// The parameters that say where and when an effect acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Placing {
+    /// The onset.
+    pub(crate) onset: Option<usize>,
+    /// The first of the four bounds of a region.
+    pub(crate) region: Option<usize>,
+}
+
+impl Placing {
+    pub(crate) fn of(info: &EffectInfo) -> Self {
+        let position = |name: &str| info.parameters.iter().position(|parameter| parameter.name == name);
+        Self { onset: position("t_on_s"), region: position("region_m") }
+    }
+
+    /// Makes the values act always and everywhere.
+    pub(crate) fn widen(self, values: &mut [f64]) {
+        if let Some(onset) = self.onset {
+            values[onset] = -EVERYWHERE;
+        }
+        if let Some(region) = self.region {
+            values[region..region + 4].copy_from_slice(&[-EVERYWHERE, EVERYWHERE, -EVERYWHERE, EVERYWHERE]);
+        }
+    }
+
+    pub(crate) fn is_some(self) -> bool {
+        self.onset.is_some() || self.region.is_some()
+    }
+}
+
 /// What a shape parameter may be at the beginning.
 enum Choices {
     /// It grows from its off value.
     Amplitude,
     /// One of these.
     Of(Vec<f64>),
-    /// All four bounds of a region, at the first of them.
-    Region,
-    /// The other three bounds.
-    Bound,
+    /// Onset or region: searched apart.
+    Placing,
     /// A size from which "off" is a jump away.
     Threshold(Vec<f64>),
 }
 
-/// Starts of an effect for units that it would act on.
+/// Starts of an effect for units that it would act on; onset and region are left at "off".
 pub(crate) fn starts(effect: Effect, units: &[&Unit<'_>]) -> Vec<Start> {
     let info = effect.info();
     let choices: Vec<Choices> = info.parameters.iter().map(|parameter| choices(info, parameter, units)).collect();
     let off: Vec<f64> = info.parameters.iter().map(|parameter| parameter.off).collect();
     let amplitudes: Vec<usize> =
         (0..choices.len()).filter(|&index| matches!(choices[index], Choices::Amplitude)).collect();
-    let mut found = vec![off.clone()];
+    let mut shapes = vec![off.clone()];
+    let mut starts: Vec<Start> = Vec::new();
     for (index, choice) in choices.iter().enumerate() {
         match choice {
-            Choices::Of(values) => found = product(&found, values, |start, value| start[index] = value),
-            Choices::Region => {
-                found = product(&found, &regions(units), |start, region| {
-                    start[index..index + 4].copy_from_slice(&region);
-                });
+            Choices::Of(values) => shapes = product(&shapes, values, |start, value| start[index] = value),
+            Choices::Threshold(values) => {
+                let at = |value: &f64| {
+                    let mut start = off.clone();
+                    start[index] = *value;
+                    Start { values: start, along: Vec::new() }
+                };
+                starts.extend(values.iter().map(at));
             }
-            _ => {}
+            Choices::Amplitude | Choices::Placing => {}
         }
     }
-    let mut starts: Vec<Start> = Vec::new();
     if !amplitudes.is_empty() {
-        starts.extend(found.iter().map(|values| Start { values: values.clone(), along: amplitudes.clone() }));
-    }
-    for (index, choice) in choices.iter().enumerate() {
-        if let Choices::Threshold(values) = choice {
-            for &value in values {
-                let mut start = off.clone();
-                start[index] = value;
-                starts.push(Start { values: start, along: Vec::new() });
-            }
-        }
+        starts.extend(shapes.into_iter().map(|values| Start { values, along: amplitudes.clone() }));
     }
     // Far from "off" a lag is no longer linear.
     if let [parameter] = info.parameters
@@ -82,11 +106,9 @@ pub(crate) fn starts(effect: Effect, units: &[&Unit<'_>]) -> Vec<Start> {
         && parameter.unit == "s"
         && info.channels.contains(&Needed::Command)
     {
-        for lag in LAGS {
-            if (parameter.plausible.0..=parameter.plausible.1).contains(&lag) {
-                starts.push(Start { values: vec![lag], along: Vec::new() });
-            }
-        }
+        let plausible = |lag: &&f64| (parameter.plausible.0..=parameter.plausible.1).contains(*lag);
+        let at = |&lag: &f64| Start { values: vec![lag], along: Vec::new() };
+        starts.extend(LAGS.iter().filter(plausible).map(at));
     }
     starts
 }
@@ -106,9 +128,7 @@ fn product<V: Copy>(starts: &[Vec<f64>], values: &[V], set: impl Fn(&mut Vec<f64
 fn choices(info: &EffectInfo, parameter: &Parameter, units: &[&Unit<'_>]) -> Choices {
     let (least, greatest) = parameter.plausible;
     match (parameter.fit, parameter.name, parameter.component) {
-        (_, "t_on_s", _) => Choices::Of(onsets(units)),
-        (_, "region_m", Some("x_min")) => Choices::Region,
-        (_, "region_m", _) => Choices::Bound,
+        (_, "t_on_s" | "region_m", _) => Choices::Placing,
         (Fit::Choice, "id" | "ids", _) => Choices::Of(landmarks(units)),
         (Fit::Choice, _, _) => Choices::Of(integers(least, greatest)),
         // A delay is smooth: it has a derivative and, like a lag, starts far from zero.
@@ -129,7 +149,8 @@ fn is_shape(info: &EffectInfo, parameter: &Parameter) -> bool {
     info.parameters.len() > 1 && parameter.relevance == pleiad_physics::Relevance::Unbounded
 }
 
-fn onsets(units: &[&Unit<'_>]) -> Vec<f64> {
+/// Onsets, evenly spaced.
+pub(crate) fn onsets(units: &[&Unit<'_>]) -> Vec<f64> {
     let first_s = units.iter().map(|unit| unit.span_s.0).fold(f64::INFINITY, f64::min);
     let last_s = units.iter().map(|unit| unit.span_s.1).fold(f64::NEG_INFINITY, f64::max);
     if first_s > last_s {
@@ -140,7 +161,7 @@ fn onsets(units: &[&Unit<'_>]) -> Vec<f64> {
 }
 
 /// Squares of the map in which the robots were, in several sizes.
-fn regions(units: &[&Unit<'_>]) -> Vec<[f64; 4]> {
+pub(crate) fn regions(units: &[&Unit<'_>]) -> Vec<[f64; 4]> {
     let places: Vec<[f64; 2]> = units
         .iter()
         .flat_map(|unit| unit.rows.iter().filter_map(|row| row.regime.pose.map(|pose| pose.position())))
