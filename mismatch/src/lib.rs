@@ -14,6 +14,7 @@ mod builtin;
 mod channel;
 mod commanded;
 mod compare;
+mod diagnose;
 mod diagnosis;
 mod error;
 mod evidence;
@@ -35,7 +36,7 @@ mod windows;
 pub use builtin::models;
 pub use channel::{Channel, Component, MAX_COMPONENTS};
 pub use compare::{ChannelComparison, RobotComparison, compare, end_to_end, residuals, residuals_of};
-pub use diagnosis::probe;
+pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, diagnose};
 pub use error::MismatchError;
 pub use evidence::Evidence;
 pub use findings::{
