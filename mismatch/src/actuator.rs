@@ -1,83 +1,123 @@
 //! The wheels against the servo that follows the commands.
 
 use pleiad_estimation::RobotId;
-use pleiad_physics::chain::actuator::{ActuatorState, Command, schedule};
+use pleiad_physics::chain::actuator::{ActuatorState, Command};
 use pleiad_physics::predict::{CommandWindow, wheel_turns};
-use pleiad_physics::{Chance, Pose, RobotModel, Scalar};
+use pleiad_physics::{Pose, RobotModel, Scalar};
 
 use crate::channel::Channel;
 use crate::evidence::Evidence;
-use crate::residual::{ChannelResiduals, Omission};
-use crate::track::{median_step, motion};
+use crate::plan::Plan;
+use crate::residual::{ChannelResiduals, Omission, Regime, Residual};
+use crate::schedule::Schedule;
+use crate::track::{Track, motion};
 use crate::windows::windows;
 
 /// Length of a window, seconds.
 const WINDOW_S: f64 = 0.2;
 /// After this long a servo has forgotten how it stood at the first command, seconds.
-const SETTLING_S: f64 = 0.6;
+pub(crate) const SETTLING_S: f64 = 0.6;
+/// A change of the set-point acts on a window that begins up to this much later, seconds.
+const CHANGE_REACH_S: f64 = 0.05;
 
-/// Turning of the wheels, measured minus predicted: their mean, and right minus left.
-///
-/// Commands are held to the next and the servo is integrated exactly, through pauses of the encoders too.
-/// Where there is no truth, loads that depend on place or heading act as at the origin.
-pub(crate) fn residuals<S: Scalar>(
-    evidence: &Evidence<'_>,
-    robot: RobotId,
-    model: &RobotModel<S>,
-) -> ChannelResiduals<S> {
-    let mut channel = ChannelResiduals::new(Channel::Actuator);
-    let Some((recording, track)) = evidence.robot(robot) else { return channel };
-    let commands: Vec<Command> = recording
-        .commands
-        .iter()
-        .map(|command| Command {
-            time_s: command.time.seconds(),
-            speed_m_s: command.forward_m_s,
-            yaw_rate_rad_s: command.yaw_rate_rad_s,
-        })
-        .collect();
-    let (Some(first), Some(last)) = (commands.first(), commands.last()) else {
-        return ChannelResiduals::without(Channel::Actuator, Omission::NotRecorded("commands"));
+/// A window of the wheels.
+pub(crate) struct Turning {
+    /// From where the window before ended to where this begins: nothing is compared, the servo goes on.
+    before: Option<CommandWindow>,
+    window: CommandWindow,
+    regime: Regime,
+    /// By how much the wheels turned, left and right, radians; `None` where the prediction is not known.
+    measured: Option<[f64; 2]>,
+    du_squared: [f64; 2],
+}
+
+/// Commands are held to the next, through pauses of the encoders too. Where there is no truth, loads that
+/// depend on place or heading act as at the origin.
+pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Turning> {
+    let Some((_, track)) = evidence.robot(robot) else {
+        return Plan::without(Omission::NotRecorded("robot"));
     };
-    // How long the last command held nobody knows; a period is sure.
-    let known_until_s = last.time_s + median_step(commands.iter().map(|command| command.time_s));
-    let scheduled = schedule(model, &commands, |_| Chance::EXPECTED);
-
-    let (found, interrupted) = windows(&track.encoders, WINDOW_S, track.pause_s);
-    channel.count_many(interrupted, |count| Omission::NoWheels(robot, count));
-    let mut state = ActuatorState::default();
-    let mut reached_s = first.time_s;
+    if let Some(omission) = track.wheels_missing() {
+        return Plan::without(omission);
+    }
+    let (Some(&(first_s, _)), Some(&(_, known_until_s))) =
+        (track.commanded_s.first(), track.commanded_s.last())
+    else {
+        return Plan::without(Omission::NotRecorded("commands"));
+    };
+    let (found, interrupted) = windows(&track.encoders, |sample| sample.time_s, WINDOW_S, track.pause_s);
+    let mut plan = Plan::new();
+    plan.count_many(interrupted, |count| Omission::NoWheels(robot, count));
+    let mut reached_s = first_s;
     for window in found {
         let (from, to) = (track.encoders[window.first], track.encoders[window.last]);
         if to.time_s <= reached_s {
-            channel.count(Omission::NoCommand);
+            plan.count(Omission::NoCommand);
             continue;
         }
         let middle_s = f64::midpoint(from.time_s, to.time_s);
         let Some(regime) = track.regime_at(middle_s) else {
-            channel.count(|count| Omission::NoWheels(robot, count));
+            plan.count(|count| Omission::NoWheels(robot, count));
             continue;
         };
         let place = regime.pose.map(|pose| pose.position());
-        let mut window = CommandWindow {
-            from_s: reached_s,
-            to_s: from.time_s,
+        let between = |from_s, to_s| CommandWindow {
+            from_s,
+            to_s,
             motion: motion(&regime, regime.pose.unwrap_or(Pose::identity())),
             surroundings: evidence.surroundings(robot, middle_s, place),
         };
-        if window.to_s > window.from_s {
-            wheel_turns(model, &scheduled, &window, &mut state);
+        let known = from.time_s >= first_s + SETTLING_S && to.time_s <= known_until_s;
+        if !known {
+            plan.count(Omission::NoCommand);
         }
-        (window.from_s, window.to_s) = (from.time_s.max(reached_s), to.time_s);
-        let predicted = wheel_turns(model, &scheduled, &window, &mut state);
+        plan.items.push(Turning {
+            before: (from.time_s > reached_s).then(|| between(reached_s, from.time_s)),
+            window: between(from.time_s.max(reached_s), to.time_s),
+            regime,
+            measured: known.then(|| [0, 1].map(|wheel| to.angle_rad[wheel] - from.angle_rad[wheel])),
+            du_squared: du_squared(track, (from.time_s - CHANGE_REACH_S, to.time_s)),
+        });
         reached_s = to.time_s;
-        if from.time_s < first.time_s + SETTLING_S || to.time_s > known_until_s {
-            channel.count(Omission::NoCommand);
-            continue;
+    }
+    plan
+}
+
+/// The sum of the squared changes of the set-point, of both wheels' mean and of right minus left, (rad/s)^2.
+fn du_squared(track: &Track, (from_s, to_s): (f64, f64)) -> [f64; 2] {
+    let [radius_m, axle_m] = track.geometry_m;
+    let commands = &track.commands;
+    let first = commands.partition_point(|command| command.time_s <= from_s).max(1);
+    let past = commands.partition_point(|command| command.time_s <= to_s).max(first);
+    let changes = (first..past).map(|index| (commands[index - 1], commands[index]));
+    changes.fold([0.0; 2], |[mean, difference], (before, after): (Command, Command)| {
+        let along = (after.speed_m_s - before.speed_m_s) / radius_m;
+        let turning = (after.yaw_rate_rad_s - before.yaw_rate_rad_s) * axle_m / radius_m;
+        [mean + along * along, difference + turning * turning]
+    })
+}
+
+/// Turning of the wheels, measured minus predicted: their mean, and right minus left. The servo is
+/// integrated exactly.
+pub(crate) fn residuals<S: Scalar>(
+    track: &Track,
+    plan: &Plan<Turning>,
+    model: &RobotModel<S>,
+) -> ChannelResiduals<S> {
+    let mut channel = ChannelResiduals::planned(Channel::Actuator, plan);
+    let mut schedule = Schedule::new(model, &track.commands);
+    let mut state = ActuatorState::default();
+    for own in &plan.items {
+        if let Some(before) = &own.before {
+            wheel_turns(model, schedule.within(before), before, &mut state);
         }
-        let [left, right] =
-            [0, 1].map(|wheel| -predicted[wheel] + (to.angle_rad[wheel] - from.angle_rad[wheel]));
-        channel.push(middle_s, regime, None, &[(left + right) * 0.5, right - left]);
+        let predicted = wheel_turns(model, schedule.within(&own.window), &own.window, &mut state);
+        let Some(measured) = own.measured else { continue };
+        let [left, right] = [0, 1].map(|wheel| -predicted[wheel] + measured[wheel]);
+        let middle_s = f64::midpoint(own.window.from_s, own.window.to_s);
+        let values = [(left + right) * 0.5, right - left];
+        let residual = Residual::new(middle_s, own.regime, None, &values, &[]);
+        channel.push(residual.with_du_squared(own.du_squared));
     }
     channel
 }

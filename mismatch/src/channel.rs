@@ -21,6 +21,9 @@ pub enum Channel {
     Actuator,
     /// Change of the true pose over 1 s against the roll-out of the encoders, in the mid-window frame.
     Body,
+    /// Change of the true pose over 1 s against the chain driven by the commands, in the mid-window frame:
+    /// for recordings without encoders.
+    CommandedBody,
     /// Mean of the gyro over 0.5 s against the yaw rate of the encoders.
     Gyro,
     /// Position against the true pose, in the robot's true frame.
@@ -52,9 +55,10 @@ const BEARING: &[Component] = &[component("bearing_rad", "rad")];
 
 impl Channel {
     /// Every channel, along the signal chain.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Actuator,
         Self::Body,
+        Self::CommandedBody,
         Self::Gyro,
         Self::Gps,
         Self::Heading,
@@ -69,6 +73,7 @@ impl Channel {
         match self {
             Self::Actuator => "actuator",
             Self::Body => "body",
+            Self::CommandedBody => "commanded_body",
             Self::Gyro => "gyro",
             Self::Gps => "gps",
             Self::Heading => "heading",
@@ -83,7 +88,7 @@ impl Channel {
     pub const fn components(self) -> &'static [Component] {
         match self {
             Self::Actuator => ACTUATOR,
-            Self::Body => BODY,
+            Self::Body | Self::CommandedBody => BODY,
             Self::Gyro => GYRO,
             Self::Gps => GPS,
             Self::Heading => HEADING,

@@ -1,16 +1,17 @@
-//! A recording against its nominal model.
+//! A recording against its nominal model, or the one that its odometry implies.
 
 use pleiad_estimation::RobotId;
 use pleiad_physics::{RobotModel, Scalar};
 use pleiad_recording::Recording;
 
+use crate::builtin;
 use crate::channel::Channel;
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
-use crate::model::nominal_models;
 use crate::residual::{ChannelResiduals, Omission};
+use crate::sightings::{self, Part};
 use crate::summary::{MIN_RESIDUALS, Summary, summarize};
-use crate::{actuator, body, sensors};
+use crate::{actuator, body, commanded, gyro, sensors};
 
 /// The residuals of every channel of a robot under a model, in the order of [`Channel::ALL`].
 ///
@@ -20,46 +21,48 @@ pub fn residuals<S: Scalar>(
     robot: RobotId,
     model: &RobotModel<S>,
 ) -> Vec<ChannelResiduals<S>> {
-    let obstacle = |channel| obstacle(evidence, robot, channel);
-    let or = |channel, compare: &dyn Fn() -> ChannelResiduals<S>| match obstacle(channel) {
-        Some(omission) => ChannelResiduals::without(channel, omission),
-        None => compare(),
-    };
-    let mut channels = vec![
-        or(Channel::Actuator, &|| actuator::residuals(evidence, robot, model)),
-        or(Channel::Body, &|| body::residuals(evidence, robot, model)),
-        or(Channel::Gyro, &|| body::gyro(evidence, robot, model)),
-        or(Channel::Gps, &|| sensors::gps(evidence, robot, model)),
-        or(Channel::Heading, &|| sensors::heading(evidence, robot, model)),
-    ];
-    match obstacle(Channel::RangeToLandmark) {
-        Some(omission) => channels.extend(
-            Channel::ALL[5..].iter().map(|&channel| ChannelResiduals::without(channel, omission.clone())),
-        ),
-        None => channels.extend(sensors::sightings(evidence, robot, model)),
-    }
-    channels
+    Channel::ALL.iter().map(|&channel| residuals_of(evidence, robot, model, channel)).collect()
 }
 
-/// What keeps a whole channel from being compared: wheels or truth that are missing or stuck.
-#[allow(clippy::float_cmp, reason = "a reading that is stuck repeats exactly")]
-fn obstacle(evidence: &Evidence<'_>, robot: RobotId, channel: Channel) -> Option<Omission> {
-    let Some((_, track)) = evidence.robot(robot) else { return Some(Omission::NotRecorded("robot")) };
-    let wheels = &track.encoders;
-    if wheels.is_empty() {
-        return Some(Omission::NotRecorded("wheel angles"));
+/// The residuals of one channel of a robot under a model.
+pub fn residuals_of<S: Scalar>(
+    evidence: &Evidence<'_>,
+    robot: RobotId,
+    model: &RobotModel<S>,
+    channel: Channel,
+) -> ChannelResiduals<S> {
+    let Some((track, plans)) = evidence.prepared(robot) else {
+        return ChannelResiduals::without(channel, Omission::NotRecorded("robot"));
+    };
+    let [to_landmark, of_landmark, to_robot, of_robot] = &plans.sightings;
+    match channel {
+        Channel::Actuator => actuator::residuals(track, &plans.actuator, model),
+        Channel::Body => body::residuals(track, &plans.body, model),
+        Channel::CommandedBody if !track.encoders.is_empty() => {
+            ChannelResiduals::without(channel, Omission::ByStages)
+        }
+        Channel::CommandedBody => commanded::residuals(track, &plans.commanded, model),
+        Channel::Gyro => gyro::residuals(&plans.gyro, model),
+        Channel::Gps => sensors::gps(&plans.gps, model),
+        Channel::Heading => sensors::heading(&plans.heading, model),
+        Channel::RangeToLandmark => sightings::residuals(channel, Part::Range, to_landmark, model),
+        Channel::BearingToLandmark => sightings::residuals(channel, Part::Bearing, of_landmark, model),
+        Channel::RangeToRobot => sightings::residuals(channel, Part::Range, to_robot, model),
+        Channel::BearingToRobot => sightings::residuals(channel, Part::Bearing, of_robot, model),
     }
-    if wheels.windows(2).all(|pair| pair[0].angle_rad == pair[1].angle_rad) {
-        return Some(Omission::Constant("wheel angles", wheels.len()));
+}
+
+/// The true motion over 1 s against the whole chain driven by the commands, also of a robot whose encoders
+/// were recorded: how well the model predicts from end to end.
+pub fn end_to_end<S: Scalar>(
+    evidence: &Evidence<'_>,
+    robot: RobotId,
+    model: &RobotModel<S>,
+) -> ChannelResiduals<S> {
+    match evidence.prepared(robot) {
+        Some((track, plans)) => commanded::residuals(track, &plans.commanded, model),
+        None => ChannelResiduals::without(Channel::CommandedBody, Omission::NotRecorded("robot")),
     }
-    if matches!(channel, Channel::Actuator | Channel::Gyro) {
-        return None;
-    }
-    if track.truth.is_empty() {
-        return Some(Omission::NotRecorded("truth"));
-    }
-    let stuck = track.truth.windows(2).all(|pair| pair[0].1 == pair[1].1);
-    stuck.then_some(Omission::Constant("true poses", track.truth.len()))
 }
 
 /// One channel of a robot against the nominal model.
@@ -87,12 +90,12 @@ impl RobotComparison {
     }
 }
 
-/// Compares a recording with its nominal model.
+/// Compares a recording with its nominal model, or with [`models`](crate::models) without one.
 ///
 /// # Errors
-/// The recording has no nominal model, or the model lacks a robot.
+/// The recording has no nominal model and its odometry is not of commands, or the model lacks a robot.
 pub fn compare(recording: &Recording) -> Result<Vec<RobotComparison>, MismatchError> {
-    let models = nominal_models(recording)?;
+    let models = builtin::models(recording)?;
     let evidence = Evidence::new(recording, &models);
     let channel = |mut residuals: ChannelResiduals<f64>| {
         let summary = summarize(&residuals);

@@ -2,31 +2,82 @@
 
 use std::collections::BTreeMap;
 
-use pleiad_estimation::RobotId;
 use pleiad_estimation::sample::Sample;
+use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_physics::{RobotModel, Surroundings};
 use pleiad_recording::{Recording, RobotRecording};
 
+use crate::plan::Plan;
 use crate::track::Track;
+use crate::{actuator, body, commanded, gyro, sensors, sightings};
+
+/// Stamps beyond this count from another epoch than the beginning of the recording, seconds: three years.
+const FOREIGN_EPOCH_S: f64 = 1e8;
 
 /// What a recording says, prepared once and compared with as many models as wanted.
 pub struct Evidence<'a> {
     pub(crate) recording: &'a Recording,
     pub(crate) tracks: BTreeMap<RobotId, Track>,
+    plans: BTreeMap<RobotId, Plans>,
+    origin: Timestamp,
+}
+
+/// What there is to compare of one robot.
+pub(crate) struct Plans {
+    pub(crate) actuator: Plan<actuator::Turning>,
+    pub(crate) body: Plan<body::Motion>,
+    /// Of any robot that has commands, also where `body` and `actuator` are compared instead.
+    pub(crate) commanded: Plan<commanded::Motion>,
+    pub(crate) gyro: Plan<gyro::Stretch>,
+    pub(crate) gps: Plan<sensors::Fix>,
+    pub(crate) heading: Plan<sensors::Heading>,
+    /// Range and bearing to landmarks, range and bearing to robots.
+    pub(crate) sightings: [Plan<sightings::Sighted>; 4],
 }
 
 impl<'a> Evidence<'a> {
     /// Prepares the robots that have a model. The models' geometry carries truth from its own stamps to
     /// those of the other channels.
     pub fn new(recording: &'a Recording, models: &BTreeMap<RobotId, RobotModel<f64>>) -> Self {
+        let origin = origin(recording);
         let track = |(&robot, model): (&RobotId, &RobotModel<f64>)| {
-            Some((robot, Track::new(recording.robots.get(&robot)?, model)))
+            Some((robot, Track::new(recording.robots.get(&robot)?, model, origin)))
         };
-        Self { recording, tracks: models.iter().filter_map(track).collect() }
+        let tracks = models.iter().filter_map(track).collect();
+        let mut evidence = Self { recording, tracks, plans: BTreeMap::new(), origin };
+        evidence.plans = evidence.tracks.keys().map(|&robot| (robot, evidence.plans_of(robot))).collect();
+        evidence
+    }
+
+    fn plans_of(&self, robot: RobotId) -> Plans {
+        Plans {
+            actuator: actuator::plan(self, robot),
+            body: body::plan(self, robot),
+            commanded: commanded::plan(self, robot, commanded::WINDOW_S),
+            gyro: gyro::plan(self, robot),
+            gps: sensors::gps_plan(self, robot),
+            heading: sensors::heading_plan(self, robot),
+            sightings: sightings::plans(self, robot),
+        }
+    }
+
+    /// The instant from which times in seconds count, of residuals and of what models say of time: zero,
+    /// or the whole second in which the recording begins if its stamps are of another epoch (Unix time).
+    pub fn origin(&self) -> Timestamp {
+        self.origin
+    }
+
+    pub(crate) fn seconds(&self, time: Timestamp) -> f64 {
+        time.seconds_since(self.origin)
     }
 
     pub(crate) fn robot(&self, robot: RobotId) -> Option<(&'a RobotRecording, &Track)> {
         Some((self.recording.robots.get(&robot)?, self.tracks.get(&robot)?))
+    }
+
+    /// What is known of a robot, and what there is to compare.
+    pub(crate) fn prepared(&self, robot: RobotId) -> Option<(&Track, &Plans)> {
+        Some((self.tracks.get(&robot)?, self.plans.get(&robot)?))
     }
 
     /// The nearest other robot whose truth is known. Steering and voltage are not recorded.
@@ -40,6 +91,17 @@ impl<'a> Evidence<'a> {
         });
         Surroundings { partner_m, ..Surroundings::default() }
     }
+}
+
+fn origin(recording: &Recording) -> Timestamp {
+    let firsts = recording.robots.values().flat_map(|own| {
+        let channels = [&own.odometry, &own.gyro, &own.gps, &own.heading, &own.sightings];
+        let samples = channels.into_iter().filter_map(|channel| channel.first().map(|sample| sample.time));
+        let command = own.commands.first().map(|command| command.time);
+        samples.chain(command).chain(own.truth.first().map(|sample| sample.time))
+    });
+    let first_s = firsts.min().map_or(0.0, Timestamp::seconds);
+    if first_s > FOREIGN_EPOCH_S { Timestamp::from_seconds(first_s.floor()) } else { Timestamp(0) }
 }
 
 /// Whether there are several readings and all are equal.

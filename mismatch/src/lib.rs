@@ -10,21 +10,41 @@
 
 mod actuator;
 mod body;
+mod builtin;
 mod channel;
+mod commanded;
 mod compare;
+mod diagnose;
+mod diagnosis;
 mod error;
 mod evidence;
+mod findings;
+mod gyro;
 mod model;
+mod plan;
+mod reckoning;
 mod residual;
+mod rollout;
+mod schedule;
 mod sensors;
+mod sightings;
 mod summary;
 mod track;
+mod view;
 mod windows;
 
+pub use builtin::models;
 pub use channel::{Channel, Component, MAX_COMPONENTS};
-pub use compare::{ChannelComparison, RobotComparison, compare, residuals};
+pub use compare::{ChannelComparison, RobotComparison, compare, end_to_end, residuals, residuals_of};
+pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, diagnose};
+pub use diagnosis::probe;
 pub use error::MismatchError;
 pub use evidence::Evidence;
+pub use findings::{
+    Estimate, Finding, Findings, HeldOut, Place, RobotRollOuts, RollOut, Undetected, Untestable, Verdict,
+};
 pub use model::{nominal_model, nominal_models};
 pub use residual::{ChannelResiduals, Omission, Regime, Residual};
+pub use rollout::{HORIZONS_S, Rollout, rollouts};
 pub use summary::{MIN_RESIDUALS, Summary, summarize};
+pub use view::{PartialResidual, Plots, ResidualSeries};

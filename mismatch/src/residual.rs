@@ -7,15 +7,16 @@ use pleiad_estimation::sample::Target;
 use pleiad_physics::{Pose, Scalar};
 
 use crate::channel::{Channel, MAX_COMPONENTS};
+use crate::plan::Plan;
 
-/// What the robot was doing.
+/// What the robot was doing, by its encoders, or without them by the velocities it was given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Regime {
-    /// Forward speed by the encoders, m/s.
+    /// Forward speed, m/s.
     pub speed_m_s: f64,
-    /// Yaw rate by the encoders, rad/s.
+    /// Yaw rate, rad/s.
     pub yaw_rate_rad_s: f64,
-    /// Forward acceleration by the encoders, m/s^2.
+    /// Forward acceleration, m/s^2.
     pub acceleration_m_s2: f64,
     /// The true pose; `None` where no truth is near.
     pub pose: Option<Pose<f64>>,
@@ -24,20 +25,72 @@ pub struct Regime {
 /// Measured minus predicted.
 #[derive(Clone, Copy, Debug)]
 pub struct Residual<S> {
-    /// Seconds: the stamp, or the middle of the window.
+    /// Seconds since the origin of the evidence: the stamp, or the middle of the window.
     pub time_s: f64,
     /// What the robot was doing then.
     pub regime: Regime,
     /// What was seen.
     pub target: Option<Target>,
     values: [S; MAX_COMPONENTS],
+    sigmas: [S; MAX_COMPONENTS],
+    du_squared: [f64; MAX_COMPONENTS],
     components: usize,
 }
 
 impl<S: Scalar> Residual<S> {
+    /// Of as many components as there are values, each with its standard deviation.
+    pub(crate) fn new(
+        time_s: f64,
+        regime: Regime,
+        target: Option<Target>,
+        values: &[S],
+        sigmas: &[S],
+    ) -> Self {
+        let mut own = Self {
+            time_s,
+            regime,
+            target,
+            values: [S::zero(); MAX_COMPONENTS],
+            sigmas: [S::one(); MAX_COMPONENTS],
+            du_squared: [0.0; MAX_COMPONENTS],
+            components: values.len().min(MAX_COMPONENTS),
+        };
+        for (slot, &value) in own.values.iter_mut().zip(values) {
+            *slot = value;
+        }
+        for (slot, &sigma) in own.sigmas.iter_mut().zip(sigmas) {
+            *slot = sigma;
+        }
+        own
+    }
+
+    /// The same with the squared changes of its set-points.
+    pub(crate) fn with_du_squared(mut self, [mean, difference]: [f64; 2]) -> Self {
+        (self.du_squared[0], self.du_squared[1]) = (mean, difference);
+        self
+    }
+
     /// The values in the order of the channel's components.
     pub fn values(&self) -> &[S] {
         &self.values[..self.components]
+    }
+
+    /// The standard deviation that the model declares for each value, with its derivatives; 1 in the
+    /// channels [`Channel::Actuator`], [`Channel::Body`] and [`Channel::CommandedBody`], whose noise no
+    /// model declares.
+    pub fn sigmas(&self) -> &[S] {
+        &self.sigmas[..self.components]
+    }
+
+    /// For the channel [`Channel::Actuator`], per component, the sum of the squared changes of the set-point
+    /// in the window and the 50 ms before it, (rad/s)^2: a command that comes at a random time adds the
+    /// variance of that time multiplied by this. Zero in the other channels.
+    pub fn du_squared(&self) -> &[f64] {
+        &self.du_squared[..self.components]
+    }
+
+    fn is_finite(&self) -> bool {
+        self.values().iter().all(|value| value.value().is_finite())
     }
 }
 
@@ -49,7 +102,7 @@ pub enum Omission {
     NotRecorded(&'static str),
     /// The channel holds this many readings, and all are equal.
     Constant(&'static str, usize),
-    /// So many readings or windows lie where a robot's wheels were not recorded without a pause.
+    /// So many readings or windows lie where a robot's odometry was not recorded without a pause.
     NoWheels(RobotId, usize),
     /// So many readings or windows have no truth of this robot near.
     NoTruth(RobotId, usize),
@@ -58,6 +111,10 @@ pub enum Omission {
     /// So many windows began before the servo could have forgotten the state it started in, or ended after
     /// the last command.
     NoCommand(usize),
+    /// So many windows lie in gaps of the commands, or so soon after one that the servo's state is unknown.
+    CommandGap(usize),
+    /// The channel's end points are compared stage by stage, because the stage between them was recorded.
+    ByStages,
     /// So many windows have too few readings.
     SparseWindow(usize),
     /// So many predictions or readings are no finite numbers.
@@ -71,10 +128,12 @@ impl fmt::Display for Omission {
         match self {
             Self::NotRecorded(what) => write!(f, "{what} not recorded"),
             Self::Constant(what, count) => write!(f, "{what} never change ({count} equal readings)"),
-            Self::NoWheels(robot, count) => write!(f, "{count} without wheel angles of robot {robot} around"),
+            Self::NoWheels(robot, count) => write!(f, "{count} without odometry of robot {robot} around"),
             Self::NoTruth(robot, count) => write!(f, "{count} without truth of robot {robot} near"),
             Self::NotInMap(count) => write!(f, "{count} of landmarks that are not in the map"),
             Self::NoCommand(count) => write!(f, "{count} windows at the ends of the commands"),
+            Self::CommandGap(count) => write!(f, "{count} windows in or soon after gaps of the commands"),
+            Self::ByStages => write!(f, "wheel angles are recorded: compared stage by stage"),
             Self::SparseWindow(count) => write!(f, "{count} windows with too few readings"),
             Self::NotFinite(count) => write!(f, "{count} that are no finite numbers"),
             Self::TooFew(found, needed) => write!(f, "{found} residuals, a summary needs {needed}"),
@@ -94,57 +153,48 @@ pub struct ChannelResiduals<S> {
 }
 
 impl<S: Scalar> ChannelResiduals<S> {
-    pub(crate) fn new(channel: Channel) -> Self {
-        Self { channel, rows: Vec::new(), omissions: Vec::new() }
-    }
-
     /// Nothing to compare, and why.
     pub(crate) fn without(channel: Channel, omission: Omission) -> Self {
         Self { channel, rows: Vec::new(), omissions: vec![omission] }
     }
 
+    /// As many residuals as will be pushed, and what the plan left out.
+    pub(crate) fn planned<T>(channel: Channel, plan: &Plan<T>) -> Self {
+        let rows = Vec::with_capacity(plan.items.len());
+        Self { channel, rows, omissions: plan.omissions.clone() }
+    }
+
     /// Adds a residual; one that is not finite is counted instead.
-    pub(crate) fn push(&mut self, time_s: f64, regime: Regime, target: Option<Target>, values: &[S]) {
-        if values.iter().any(|value| !value.value().is_finite()) {
-            self.count(Omission::NotFinite);
+    pub(crate) fn push(&mut self, residual: Residual<S>) {
+        if residual.is_finite() {
+            self.rows.push(residual);
+        } else {
+            tally(&mut self.omissions, 1, Omission::NotFinite);
+        }
+    }
+}
+
+/// Counts `more` omissions of the kind that `of` makes of a count.
+pub(crate) fn tally(omissions: &mut Vec<Omission>, more: usize, of: impl Fn(usize) -> Omission) {
+    if more == 0 {
+        return;
+    }
+    let kind = std::mem::discriminant(&of(0));
+    for omission in omissions.iter_mut().filter(|omission| std::mem::discriminant(*omission) == kind) {
+        let counted = match omission {
+            Omission::NoWheels(_, count)
+            | Omission::NoTruth(_, count)
+            | Omission::NotInMap(count)
+            | Omission::NoCommand(count)
+            | Omission::CommandGap(count)
+            | Omission::SparseWindow(count)
+            | Omission::NotFinite(count) => *count,
+            _ => continue,
+        };
+        if of(counted) == *omission {
+            *omission = of(counted + more);
             return;
         }
-        let mut all = [S::zero(); MAX_COMPONENTS];
-        for (slot, &value) in all.iter_mut().zip(values) {
-            *slot = value;
-        }
-        let components = values.len().min(MAX_COMPONENTS);
-        self.rows.push(Residual { time_s, regime, target, values: all, components });
     }
-
-    /// Counts one more omission of the kind that `of` makes of a count.
-    pub(crate) fn count(&mut self, of: impl Fn(usize) -> Omission) {
-        self.count_many(1, of);
-    }
-
-    pub(crate) fn count_many(&mut self, more: usize, of: impl Fn(usize) -> Omission) {
-        if more == 0 {
-            return;
-        }
-        let kind = std::mem::discriminant(&of(0));
-        for omission in &mut self.omissions {
-            if std::mem::discriminant(omission) != kind {
-                continue;
-            }
-            let counted = match omission {
-                Omission::NoWheels(_, count)
-                | Omission::NoTruth(_, count)
-                | Omission::NotInMap(count)
-                | Omission::NoCommand(count)
-                | Omission::SparseWindow(count)
-                | Omission::NotFinite(count) => *count,
-                _ => continue,
-            };
-            if of(counted) == *omission {
-                *omission = of(counted + more);
-                return;
-            }
-        }
-        self.omissions.push(of(more));
-    }
+    omissions.push(of(more));
 }

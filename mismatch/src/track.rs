@@ -1,111 +1,134 @@
-//! One robot's wheels and truth, asked for any instant.
+//! One robot's odometry, commands and truth, asked for any instant.
 
+use pleiad_estimation::Timestamp;
 use pleiad_estimation::sample::{Reading, Sample};
+use pleiad_physics::chain::actuator::Command;
 use pleiad_physics::predict::EncoderSample;
 use pleiad_physics::{Drive, Motion, Pose, RobotModel};
 use pleiad_recording::{RobotRecording, TruthSample};
 
-use crate::residual::Regime;
+use crate::reckoning::{Reckoned, Reckoning, Step};
+use crate::residual::{Omission, Regime};
 
 /// Velocity is the motion from this long before an instant to this long after it, seconds: long enough
 /// that a tick of a coarse encoder is small, short against any manoeuvre.
 const VELOCITY_REACH_S: f64 = 0.05;
 /// A truth sample is carried no farther than this, seconds.
 const TRUTH_REACH_S: f64 = 0.1;
-/// A step between encoder samples is a pause if it is longer than this many median steps.
+/// A step between samples is a pause if it is longer than this many median steps.
 const PAUSE_FACTOR: f64 = 5.0;
+/// A step between commands is no gap up to this, seconds: a logger that is late now and then is usual.
+const SHORTEST_GAP_S: f64 = 0.5;
 
-/// Dead reckoning at an instant, in the frame of its beginning.
-#[derive(Clone, Copy)]
-struct Reckoned {
-    pose: Pose<f64>,
-    path_m: f64,
-}
-
-/// What the wheels and the reference system recorded of one robot.
+/// What a robot's odometry, its commands and the reference system recorded, in seconds from the origin.
 pub(crate) struct Track {
     /// Samples of the wheels; empty if odometry is of another kind.
     pub(crate) encoders: Vec<EncoderSample>,
     /// A longer step between encoder samples is a pause, seconds.
     pub(crate) pause_s: f64,
-    /// Reference poses with their stamps in seconds.
+    /// Reference poses with their stamps.
     pub(crate) truth: Vec<(f64, Pose<f64>)>,
-    reckoned: Vec<Reckoned>,
-    radius_m: f64,
-    axle_m: f64,
+    /// What drove the robot: its commands, or else its velocity odometry. One that repeats the one before
+    /// is left out.
+    pub(crate) commands: Vec<Command>,
+    /// From when to when commands are known, without gaps.
+    pub(crate) commanded_s: Vec<(f64, f64)>,
+    reckoning: Reckoning,
+    /// Wheel radius and track width that the firmware believes, metres.
+    pub(crate) geometry_m: [f64; 2],
 }
 
 impl Track {
-    /// Reckons with the declared geometry: over the few milliseconds that truth is carried, its errors
-    /// do not matter.
-    pub(crate) fn new(recording: &RobotRecording, model: &RobotModel<f64>) -> Self {
-        let encoders: Vec<_> = recording.odometry.iter().filter_map(encoder_sample).collect();
+    /// Reckons by the encoders with the declared geometry, or without encoders by the velocities: over the
+    /// few milliseconds that truth is carried, their errors do not matter.
+    pub(crate) fn new(recording: &RobotRecording, model: &RobotModel<f64>, origin: Timestamp) -> Self {
+        let encoders: Vec<_> =
+            recording.odometry.iter().filter_map(|sample| encoder_sample(sample, origin)).collect();
         let ratio = match model.drive {
             Drive::SkidSteer { track_ratio } => track_ratio,
             Drive::Differential | Drive::CarLike { .. } => 1.0,
         };
-        let mut track = Self {
-            pause_s: PAUSE_FACTOR * median_step(encoders.iter().map(|sample| sample.time_s)),
-            encoders,
-            truth: recording.truth.iter().map(truth_pose).collect(),
-            reckoned: Vec::new(),
-            radius_m: model.nominal.wheel_radius,
-            axle_m: model.nominal.track_width * ratio,
-        };
-        let mut here = Reckoned { pose: Pose::identity(), path_m: 0.0 };
-        let mut reckoned = Vec::with_capacity(track.encoders.len());
-        for (index, sample) in track.encoders.iter().enumerate() {
-            if index > 0 {
-                here = track.rolled(here, track.encoders[index - 1].angle_rad, sample.angle_rad);
-            }
-            reckoned.push(here);
+        let geometry_m = [model.nominal.wheel_radius, model.nominal.track_width * ratio];
+        let pause_s = PAUSE_FACTOR * median_step(encoders.iter().map(|sample| sample.time_s));
+        let velocities = velocities(recording, origin);
+        let mut commands = commands(recording, origin);
+        if commands.is_empty() {
+            commands.clone_from(&velocities);
         }
-        track.reckoned = reckoned;
-        track
+        let reckoning = if !encoders.is_empty() {
+            Reckoning::new(wheel_steps(&encoders, geometry_m), pause_s)
+        } else if !velocities.is_empty() {
+            Reckoning::new(held_steps(&velocities), gap_s(&velocities))
+        } else {
+            Reckoning::new(held_steps(&commands), gap_s(&commands))
+        };
+        Self {
+            encoders,
+            pause_s,
+            truth: recording.truth.iter().map(|sample| truth_pose(sample, origin)).collect(),
+            commanded_s: stretches(&commands),
+            commands: changes(commands),
+            reckoning,
+            geometry_m,
+        }
     }
 
-    fn rolled(&self, from: Reckoned, before: [f64; 2], after: [f64; 2]) -> Reckoned {
-        let [left, right] = [0, 1].map(|wheel| self.radius_m * (after[wheel] - before[wheel]));
-        let forward = f64::midpoint(left, right);
-        let moved = Pose::exp(forward, 0.0, (right - left) / self.axle_m);
-        Reckoned { pose: from.pose.compose(&moved), path_m: from.path_m + forward }
+    /// What keeps wheels from being compared: none were recorded, or they are stuck.
+    #[allow(clippy::float_cmp, reason = "a reading that is stuck repeats exactly")]
+    pub(crate) fn wheels_missing(&self) -> Option<Omission> {
+        if self.encoders.is_empty() {
+            return Some(Omission::NotRecorded("wheel angles"));
+        }
+        let stuck = self.encoders.windows(2).all(|pair| pair[0].angle_rad == pair[1].angle_rad);
+        stuck.then_some(Omission::Constant("wheel angles", self.encoders.len()))
+    }
+
+    /// What keeps truth from being compared.
+    pub(crate) fn truth_missing(&self) -> Option<Omission> {
+        if self.truth.is_empty() {
+            return Some(Omission::NotRecorded("truth"));
+        }
+        let stuck = self.truth.windows(2).all(|pair| pair[0].1 == pair[1].1);
+        stuck.then_some(Omission::Constant("true poses", self.truth.len()))
+    }
+
+    /// What keeps readings from being placed: truth, or the motion that carries it to their stamps.
+    pub(crate) fn placing_missing(&self) -> Option<Omission> {
+        let motion = if self.reckoning.is_empty() {
+            Some(Omission::NotRecorded("wheel angles or velocities"))
+        } else if self.encoders.is_empty() {
+            None
+        } else {
+            self.wheels_missing()
+        };
+        motion.or_else(|| self.truth_missing())
     }
 
     /// The wheels' angles at an instant: encoders are nearly free of noise, so they may be interpolated.
     /// `None` outside the samples and in a pause.
     pub(crate) fn wheels_at(&self, time_s: f64) -> Option<EncoderSample> {
-        let (_, sample) = self.interpolated(time_s)?;
-        Some(sample)
-    }
-
-    fn interpolated(&self, time_s: f64) -> Option<(usize, EncoderSample)> {
         let after = self.encoders.partition_point(|sample| sample.time_s <= time_s);
-        let index = after.checked_sub(1)?;
-        let before = self.encoders[index];
-        let Some(next) = self.encoders.get(after) else {
-            return (before.time_s >= time_s).then_some((index, before));
-        };
-        let step_s = next.time_s - before.time_s;
+        let before = *self.encoders.get(after.checked_sub(1)?)?;
         let since_s = time_s - before.time_s;
-        if since_s > 0.0 && step_s > self.pause_s {
-            return None;
+        if since_s <= 0.0 {
+            return Some(before);
         }
+        let next = self.encoders.get(after)?;
+        let step_s = next.time_s - before.time_s;
         let share = since_s / step_s;
         let angle = |wheel: usize| {
             before.angle_rad[wheel] + share * (next.angle_rad[wheel] - before.angle_rad[wheel])
         };
-        Some((index, EncoderSample { time_s, angle_rad: [angle(0), angle(1)] }))
+        (step_s <= self.pause_s).then(|| EncoderSample { time_s, angle_rad: [angle(0), angle(1)] })
     }
 
     fn reckoned_at(&self, time_s: f64) -> Option<Reckoned> {
-        let (index, sample) = self.interpolated(time_s)?;
-        Some(self.rolled(self.reckoned[index], self.encoders[index].angle_rad, sample.angle_rad))
+        self.reckoning.at(time_s)
     }
 
     /// Mean forward speed and yaw rate around an instant, over what of it was recorded.
     fn velocity_at(&self, time_s: f64) -> Option<(f64, f64)> {
-        let first_s = self.encoders.first()?.time_s;
-        let last_s = self.encoders.last()?.time_s;
+        let (first_s, last_s) = self.reckoning.span_s()?;
         let from_s = (time_s - VELOCITY_REACH_S).max(first_s);
         let to_s = (time_s + VELOCITY_REACH_S).min(last_s);
         let (from, to) = (self.reckoned_at(from_s)?, self.reckoned_at(to_s)?);
@@ -114,10 +137,10 @@ impl Track {
         (lasted_s > 0.0).then_some(rates)
     }
 
-    /// The true pose at an instant: the truth sample with the nearest stamp, carried by the encoders.
+    /// The true pose at an instant: the truth sample with the nearest stamp, carried by the odometry.
     ///
     /// Interpolated truth would be differentiated truth: its noise would depend on the sample's phase.
-    /// `None` where no truth is near, or the wheels were not recorded.
+    /// `None` where no truth is near, or the odometry was not recorded.
     pub(crate) fn truth_at(&self, time_s: f64) -> Option<Pose<f64>> {
         let after = self.truth.partition_point(|(stamp_s, _)| *stamp_s < time_s);
         let near = [after.checked_sub(1), Some(after)].into_iter().flatten();
@@ -131,7 +154,7 @@ impl Track {
         Some(pose.compose(&moved))
     }
 
-    /// What the robot was doing; `None` where the wheels were not recorded.
+    /// What the robot was doing; `None` where the odometry was not recorded.
     pub(crate) fn regime_at(&self, time_s: f64) -> Option<Regime> {
         let (speed_m_s, yaw_rate_rad_s) = self.velocity_at(time_s)?;
         let change = self
@@ -153,18 +176,96 @@ pub(crate) fn motion(regime: &Regime, pose: Pose<f64>) -> Motion<f64> {
     }
 }
 
-fn encoder_sample(sample: &Sample) -> Option<EncoderSample> {
+fn encoder_sample(sample: &Sample, origin: Timestamp) -> Option<EncoderSample> {
     match sample.reading {
-        Reading::Wheels { left_rad, right_rad } => {
-            Some(EncoderSample { time_s: sample.time.seconds(), angle_rad: [left_rad, right_rad] })
-        }
+        Reading::Wheels { left_rad, right_rad } => Some(EncoderSample {
+            time_s: sample.time.seconds_since(origin),
+            angle_rad: [left_rad, right_rad],
+        }),
         _ => None,
     }
 }
 
-fn truth_pose(sample: &TruthSample) -> (f64, Pose<f64>) {
+fn truth_pose(sample: &TruthSample, origin: Timestamp) -> (f64, Pose<f64>) {
     let pose = &sample.pose;
-    (sample.time.seconds(), Pose::new(pose.x_m(), pose.y_m(), pose.yaw_rad()))
+    (sample.time.seconds_since(origin), Pose::new(pose.x_m(), pose.y_m(), pose.yaw_rad()))
+}
+
+fn commands(recording: &RobotRecording, origin: Timestamp) -> Vec<Command> {
+    let command = |own: &pleiad_recording::Command| Command {
+        time_s: own.time.seconds_since(origin),
+        speed_m_s: own.forward_m_s,
+        yaw_rate_rad_s: own.yaw_rate_rad_s,
+    };
+    recording.commands.iter().map(command).collect()
+}
+
+fn velocities(recording: &RobotRecording, origin: Timestamp) -> Vec<Command> {
+    let velocity = |sample: &Sample| match sample.reading {
+        Reading::Velocity { forward_m_s, yaw_rate_rad_s } => Some(Command {
+            time_s: sample.time.seconds_since(origin),
+            speed_m_s: forward_m_s,
+            yaw_rate_rad_s,
+        }),
+        _ => None,
+    };
+    recording.odometry.iter().filter_map(velocity).collect()
+}
+
+/// What the body does by the wheels, each step an arc.
+fn wheel_steps(encoders: &[EncoderSample], [radius_m, axle_m]: [f64; 2]) -> impl Iterator<Item = Step> + '_ {
+    encoders.iter().enumerate().map(move |(index, sample)| {
+        let next = encoders.get(index + 1).unwrap_or(sample);
+        let [left, right] = [0, 1].map(|wheel| radius_m * (next.angle_rad[wheel] - sample.angle_rad[wheel]));
+        Step {
+            time_s: sample.time_s,
+            forward_m: f64::midpoint(left, right),
+            yaw_rad: (right - left) / axle_m,
+        }
+    })
+}
+
+/// What the body does if each velocity holds to the next.
+fn held_steps(commands: &[Command]) -> impl Iterator<Item = Step> + '_ {
+    commands.iter().enumerate().map(|(index, command)| {
+        let held_s = commands.get(index + 1).map_or(0.0, |next| next.time_s - command.time_s);
+        Step {
+            time_s: command.time_s,
+            forward_m: held_s * command.speed_m_s,
+            yaw_rad: held_s * command.yaw_rate_rad_s,
+        }
+    })
+}
+
+/// A longer step between commands is a gap, seconds.
+fn gap_s(commands: &[Command]) -> f64 {
+    (PAUSE_FACTOR * median_step(commands.iter().map(|command| command.time_s))).max(SHORTEST_GAP_S)
+}
+
+/// The stretches without gaps. How long the last command held nobody knows; a period is sure.
+fn stretches(commands: &[Command]) -> Vec<(f64, f64)> {
+    let (Some(first), Some(last)) = (commands.first(), commands.last()) else { return Vec::new() };
+    let gap_s = gap_s(commands);
+    let mut found = Vec::new();
+    let mut from_s = first.time_s;
+    for pair in commands.windows(2) {
+        if pair[1].time_s - pair[0].time_s > gap_s {
+            found.push((from_s, pair[0].time_s));
+            from_s = pair[1].time_s;
+        }
+    }
+    let period_s = median_step(commands.iter().map(|command| command.time_s));
+    found.push((from_s, last.time_s + if period_s.is_finite() { period_s } else { 0.0 }));
+    found
+}
+
+/// The commands that differ from the one before: a command holds to the next, so the rest say nothing.
+#[allow(clippy::float_cmp, reason = "a command that is repeated repeats exactly")]
+fn changes(mut commands: Vec<Command>) -> Vec<Command> {
+    commands.dedup_by(|next, kept| {
+        next.speed_m_s == kept.speed_m_s && next.yaw_rate_rad_s == kept.yaw_rate_rad_s
+    });
+    commands
 }
 
 /// The median step between increasing times, seconds; infinite below two.
@@ -178,7 +279,7 @@ pub(crate) fn median_step(times_s: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pleiad_estimation::{Pose2, Timestamp};
+    use pleiad_estimation::Pose2;
     use pleiad_physics::Nominal;
 
     /// Straight ahead at 0.5 m/s, wheels at 50 Hz without the samples in `(pause.0, pause.1)`.
@@ -197,7 +298,8 @@ mod tests {
             let (time, pose) = (Timestamp::from_seconds(time_s), Pose2::new(x, 0.0, 0.0));
             recording.truth.push(TruthSample { time, pose });
         }
-        Track::new(&recording, &RobotModel::nominal(Drive::Differential, Nominal::ideal(0.05, 0.3)))
+        let model = RobotModel::nominal(Drive::Differential, Nominal::ideal(0.05, 0.3));
+        Track::new(&recording, &model, Timestamp(0))
     }
 
     #[test]

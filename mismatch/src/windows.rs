@@ -1,7 +1,5 @@
 //! Windows that do not overlap.
 
-use pleiad_physics::predict::EncoderSample;
-
 /// From one sample of a series to a later one, by their positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Window {
@@ -9,17 +7,23 @@ pub(crate) struct Window {
     pub(crate) last: usize,
 }
 
-/// Windows between encoder samples, each at least `length_s` long to within half a sample, and how many
-/// were given up because a pause interrupts them. A window begins where the one before ended.
-pub(crate) fn windows(samples: &[EncoderSample], length_s: f64, pause_s: f64) -> (Vec<Window>, usize) {
+/// Windows between samples, each at least `length_s` long to within half a sample, and how many were given
+/// up because a pause interrupts them. A window begins where the one before ended.
+pub(crate) fn windows<T>(
+    samples: &[T],
+    time_s: impl Fn(&T) -> f64,
+    length_s: f64,
+    pause_s: f64,
+) -> (Vec<Window>, usize) {
     let (mut found, mut interrupted) = (Vec::new(), 0);
     let mut first = 0;
     for last in 1..samples.len() {
-        let step_s = samples[last].time_s - samples[last - 1].time_s;
+        let now_s = time_s(&samples[last]);
+        let step_s = now_s - time_s(&samples[last - 1]);
         if step_s > pause_s {
             first = last;
             interrupted += 1;
-        } else if samples[last].time_s - samples[first].time_s >= length_s - 0.5 * step_s {
+        } else if now_s - time_s(&samples[first]) >= length_s - 0.5 * step_s {
             found.push(Window { first, last });
             first = last;
         }
@@ -34,8 +38,7 @@ mod tests {
     #[test]
     fn windows_join_and_none_spans_a_pause() {
         let times = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 2.0, 2.1, 2.2, 2.3];
-        let samples = times.map(|time_s| EncoderSample { time_s, angle_rad: [0.0; 2] });
-        let (found, interrupted) = windows(&samples, 0.2, 0.5);
+        let (found, interrupted) = windows(&times, |&time_s| time_s, 0.2, 0.5);
         let pairs: Vec<_> = found.iter().map(|window| (window.first, window.last)).collect();
         assert_eq!(pairs, [(0, 2), (2, 4), (6, 8)]);
         assert_eq!(interrupted, 1);

@@ -18,6 +18,7 @@ impl<const P: usize> Dual<P> {
     /// The parameter number `index` itself: its derivative with respect to itself is one.
     ///
     /// An `index` of `P` or more gives a constant: the number depends on none of the parameters.
+    #[inline]
     pub fn variable(value: f64, index: usize) -> Self {
         let mut derivatives = [0.0; P];
         if let Some(own) = derivatives.get_mut(index) {
@@ -27,14 +28,22 @@ impl<const P: usize> Dual<P> {
     }
 
     /// The derivatives, in the order of the parameters.
+    #[inline]
     pub fn derivatives(&self) -> &[f64; P] {
         &self.derivatives
     }
 
+    #[inline]
     fn combined(value: f64, first: &Self, by_first: f64, second: &Self, by_second: f64) -> Self {
         let mut derivatives = [0.0; P];
-        for ((out, a), b) in derivatives.iter_mut().zip(first.derivatives).zip(second.derivatives) {
-            *out = scaled(a, by_first) + scaled(b, by_second);
+        if by_first.is_finite() && by_second.is_finite() {
+            for ((out, a), b) in derivatives.iter_mut().zip(first.derivatives).zip(second.derivatives) {
+                *out = a * by_first + b * by_second;
+            }
+        } else {
+            for ((out, a), b) in derivatives.iter_mut().zip(first.derivatives).zip(second.derivatives) {
+                *out = scaled(a, by_first) + scaled(b, by_second);
+            }
         }
         Self { value, derivatives }
     }
@@ -47,18 +56,27 @@ fn scaled(derivative: f64, by: f64) -> f64 {
 }
 
 impl<const P: usize> Scalar for Dual<P> {
+    #[inline]
     fn constant(value: f64) -> Self {
         Self { value, derivatives: [0.0; P] }
     }
 
+    #[inline]
     fn value(self) -> f64 {
         self.value
     }
 
+    #[inline]
     fn chain(self, value: f64, derivative: f64) -> Self {
-        Self { value, derivatives: self.derivatives.map(|own| scaled(own, derivative)) }
+        let derivatives = if derivative.is_finite() {
+            self.derivatives.map(|own| own * derivative)
+        } else {
+            self.derivatives.map(|own| scaled(own, derivative))
+        };
+        Self { value, derivatives }
     }
 
+    #[inline]
     fn atan2(self, x: Self) -> Self {
         let square = self.value * self.value + x.value * x.value;
         let angle = libm::atan2(self.value, x.value);
@@ -68,6 +86,7 @@ impl<const P: usize> Scalar for Dual<P> {
 
 impl<const P: usize> Neg for Dual<P> {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         self.chain(-self.value, -1.0)
     }
@@ -75,6 +94,7 @@ impl<const P: usize> Neg for Dual<P> {
 
 impl<const P: usize> Add for Dual<P> {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self::combined(self.value + other.value, &self, 1.0, &other, 1.0)
     }
@@ -82,6 +102,7 @@ impl<const P: usize> Add for Dual<P> {
 
 impl<const P: usize> Sub for Dual<P> {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self::combined(self.value - other.value, &self, 1.0, &other, -1.0)
     }
@@ -89,6 +110,7 @@ impl<const P: usize> Sub for Dual<P> {
 
 impl<const P: usize> Mul for Dual<P> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         Self::combined(self.value * other.value, &self, other.value, &other, self.value)
     }
@@ -96,6 +118,7 @@ impl<const P: usize> Mul for Dual<P> {
 
 impl<const P: usize> Div for Dual<P> {
     type Output = Self;
+    #[inline]
     fn div(self, other: Self) -> Self {
         let quotient = self.value / other.value;
         Self::combined(quotient, &self, 1.0 / other.value, &other, -quotient / other.value)
@@ -106,6 +129,7 @@ macro_rules! with_number {
     ($($trait:ident $method:ident $by:expr;)*) => {$(
         impl<const P: usize> $trait<f64> for Dual<P> {
             type Output = Self;
+            #[inline]
             fn $method(self, other: f64) -> Self {
                 let by: fn(f64) -> f64 = $by;
                 self.chain(self.value.$method(other), by(other))
@@ -123,6 +147,7 @@ with_number! {
 macro_rules! in_place {
     ($($trait:ident $method:ident $operator:tt;)*) => {$(
         impl<const P: usize> $trait for Dual<P> {
+            #[inline]
             fn $method(&mut self, other: Self) {
                 *self = *self $operator other;
             }
@@ -137,24 +162,28 @@ in_place! {
 }
 
 impl<const P: usize> PartialEq for Dual<P> {
+    #[inline]
     fn eq(&self, other: &Self) -> bool {
         self.value == other.value
     }
 }
 
 impl<const P: usize> PartialOrd for Dual<P> {
+    #[inline]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         self.value.partial_cmp(&other.value)
     }
 }
 
 impl<const P: usize> PartialEq<f64> for Dual<P> {
+    #[inline]
     fn eq(&self, other: &f64) -> bool {
         self.value == *other
     }
 }
 
 impl<const P: usize> PartialOrd<f64> for Dual<P> {
+    #[inline]
     fn partial_cmp(&self, other: &f64) -> Option<Ordering> {
         self.value.partial_cmp(other)
     }

@@ -26,6 +26,8 @@ pub enum Command {
     Observability(ObservabilityArgs),
     /// A recording of a scenario; or what the nominal model predicts of one, and what was measured instead.
     Simulate(SimulateArgs),
+    /// What physics the nominal model leaves out: where, what, how sure, and the corrected model.
+    Diagnose(DiagnoseArgs),
     /// The physics a simulation can leave out: names, parameters, equations.
     Effects(EffectsArgs),
     /// One robot's agent.
@@ -173,6 +175,35 @@ pub struct SimulateArgs {
 }
 
 #[derive(Debug, Args)]
+pub struct DiagnoseArgs {
+    /// Recording folders, run folders or MRCLAM folders; several are diagnosed together.
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// What the nominal simulation believes, instead of the recordings' own nominal.toml.
+    #[arg(long, value_name = "NOMINAL.TOML")]
+    pub model: Option<PathBuf>,
+    /// Whether ground truth is used.
+    #[arg(long, value_enum, default_value_t = TruthArg::Auto)]
+    pub truth: TruthArg,
+    /// Recordings to fit on, by the names of their folders, as in a,b. Default: those that are not tested on.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub fit_on: Vec<String>,
+    /// Recordings to test on, by the names of their folders. Default: those that are not fitted on; if there
+    /// are none, parts of the recordings that are left out of the fit.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub test_on: Vec<String>,
+    /// Leave out rows that cannot be read; they are counted and reported.
+    #[arg(long)]
+    pub skip_bad_rows: bool,
+    /// Folder for report.html, findings.json and corrected.toml; a new one under runs/ if absent.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// The object of findings.json on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
 pub struct EffectsArgs {
     /// Only this effect, with its parameters and what it is confounded with.
     pub name: Option<String>,
@@ -222,6 +253,14 @@ pub enum StrategyArg {
     Exact,
     /// Observations of other robots are ignored.
     Independent,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TruthArg {
+    /// Where it was recorded.
+    Auto,
+    /// Not at all.
+    No,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -32,6 +32,17 @@ pub fn error(error: &anyhow::Error) {
     }
 }
 
+/// What is being done, on stderr; nothing where stderr is no terminal.
+pub fn spinner(message: &str) -> ProgressBar {
+    let spinner = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}  {elapsed}") {
+        spinner.set_style(style);
+    }
+    spinner.set_message(message.to_owned());
+    spinner.enable_steady_tick(std::time::Duration::from_millis(120));
+    spinner
+}
+
 /// A bar over team time in seconds on stderr; nothing where stderr is no terminal.
 pub fn progress(label: &str, seconds: f64) -> ProgressBar {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds of a run")]

@@ -1,4 +1,4 @@
-//! Writes `demo.html` and `replay.html` from made-up data into the folder given (default `target/gallery`),
+//! Writes `demo.html`, `replay.html` and `diagnose.html` from made-up data into the folder given (default `target/gallery`),
 //! to look at the reports' style without running a team:
 //! `cargo run -p pleiad-report --example gallery`.
 
@@ -10,8 +10,11 @@ use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use pleiad_report::{
     DemoCase, DemoReport, FactCount, Landmark, NisPoint, NisSeries, ReplayReport, RobotScore, RobotSeries,
-    TeamSeries, demo_report, replay_report,
+    TeamSeries, demo_report, diagnose_report, replay_report,
 };
+
+#[path = "../tests/fixture/mod.rs"]
+mod fixture;
 
 const STEP_S: f64 = 0.1;
 /// Random walk of the whole team's unobserved position, m per square root of a second, and heading, rad.
@@ -26,6 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&folder)?;
     demo_report(&demo())?.write(&folder.join("demo.html"))?;
     replay_report(&replay())?.write(&folder.join("replay.html"))?;
+    diagnose_report(&fixture::diagnosis(3, 240, 1))?.write(&folder.join("diagnose.html"))?;
     Ok(())
 }
 

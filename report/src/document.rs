@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::html::{escape, json_for_script, prose};
 use crate::trace::Thinning;
-use crate::{Figure, MAX_POINTS, ReportError, Table};
+use crate::{Card, Figure, MAX_POINTS, ReportError, Table};
 
 const STYLE: &str = include_str!("../assets/report.css");
 const SCRIPT: &str = include_str!("../assets/report.js");
@@ -34,6 +34,27 @@ pub enum Verdict {
     Fails,
 }
 
+/// The colour of a conclusion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// Nothing to do.
+    Good,
+    /// Something to change.
+    Bad,
+    /// Something to find out.
+    Open,
+}
+
+impl Tone {
+    pub(crate) fn class(self) -> &'static str {
+        match self {
+            Self::Good => "holds",
+            Self::Bad => "fails",
+            Self::Open => "open",
+        }
+    }
+}
+
 /// One of several figures side by side (below one another on a narrow screen).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
@@ -46,13 +67,16 @@ pub struct Panel {
 #[derive(Clone, Debug, PartialEq)]
 enum Block {
     Lead(String),
-    Verdict(Verdict, String),
+    Conclusion(Tone, String, String),
     Facts(Vec<(String, String)>),
     Section(String),
+    Part(String),
     Prose(String),
     List(Vec<String>),
     Table(Table),
     Figure(Vec<Panel>, String),
+    Drawing(String, String),
+    Card(Card),
 }
 
 /// Running numbers of what is referred to.
@@ -76,7 +100,26 @@ impl Document {
 
     /// The conclusion, set apart.
     pub fn verdict(self, verdict: Verdict, text: impl Into<String>) -> Self {
-        self.with(Block::Verdict(verdict, text.into()))
+        let (tone, word) = match verdict {
+            Verdict::Holds => (Tone::Good, "As predicted."),
+            Verdict::Fails => (Tone::Bad, "Not as predicted."),
+        };
+        self.conclusion(tone, word, text)
+    }
+
+    /// A conclusion in a few words, and what there is to say of it, set apart.
+    pub fn conclusion(self, tone: Tone, words: impl Into<String>, text: impl Into<String>) -> Self {
+        self.with(Block::Conclusion(tone, words.into(), text.into()))
+    }
+
+    /// A card.
+    pub fn card(self, card: Card) -> Self {
+        self.with(Block::Card(card))
+    }
+
+    /// A drawing of our own; the caption says what to see in it.
+    pub(crate) fn drawing(self, svg: String, caption: impl Into<String>) -> Self {
+        self.with(Block::Drawing(svg, caption.into()))
     }
 
     /// A key and its value; neighbours form one compact list.
@@ -92,6 +135,11 @@ impl Document {
     /// Starts a section.
     pub fn section(self, heading: impl Into<String>) -> Self {
         self.with(Block::Section(heading.into()))
+    }
+
+    /// Starts a part of several sections; on paper, a new page.
+    pub fn part(self, heading: impl Into<String>) -> Self {
+        self.with(Block::Part(heading.into()))
     }
 
     /// A paragraph.
@@ -177,12 +225,9 @@ impl Block {
     fn render(&self, numbers: &mut Numbers) -> String {
         match self {
             Self::Lead(text) => format!("<p class=\"lead\">{}</p>\n", prose(text)),
-            Self::Verdict(verdict, text) => {
-                let (class, word) = match verdict {
-                    Verdict::Holds => ("holds", "As predicted."),
-                    Verdict::Fails => ("fails", "Not as predicted."),
-                };
-                format!("<p class=\"verdict {class}\"><b>{word}</b> {}</p>\n", prose(text))
+            Self::Conclusion(tone, words, text) => {
+                let class = tone.class();
+                format!("<p class=\"verdict {class}\"><b>{}</b> {}</p>\n", escape(words), prose(text))
             }
             Self::Facts(facts) => {
                 let items = each(facts, |(key, value)| {
@@ -191,6 +236,17 @@ impl Block {
                 format!("<dl>\n{items}</dl>\n")
             }
             Self::Section(heading) => format!("<h2>{}</h2>\n", escape(heading)),
+            Self::Part(heading) => format!("<h2 class=\"part\">{}</h2>\n", escape(heading)),
+            Self::Card(card) => card.render(),
+            Self::Drawing(svg, caption) => {
+                numbers.figures += 1;
+                let number = numbers.figures;
+                format!(
+                    "<figure id=\"figure-{number}\">\n<div class=\"drawing\">{svg}</div>\n\
+                     <figcaption><b>Figure {number}.</b> {}</figcaption>\n</figure>\n",
+                    prose(caption)
+                )
+            }
             Self::Prose(text) => format!("<p>{}</p>\n", prose(text)),
             Self::List(items) => {
                 let items = each(items, |item| format!("<li>{}</li>\n", prose(item)));
@@ -209,7 +265,7 @@ impl Block {
 }
 
 /// The HTML of every item, joined.
-fn each<T>(items: &[T], html: impl Fn(&T) -> String) -> String {
+pub(crate) fn each<T>(items: &[T], html: impl Fn(&T) -> String) -> String {
     items.iter().map(html).collect()
 }
 

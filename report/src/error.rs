@@ -23,6 +23,21 @@ pub enum ReportError {
         /// The length of `time_s`.
         expected: usize,
     },
+    /// The columns of a series of residuals differ in length.
+    #[error(
+        "residuals of robot {robot}, {channel}: a column has {found} entries where `time_s` has {expected}; \
+         give one entry per instant"
+    )]
+    ResidualColumns {
+        /// Whose residuals.
+        robot: RobotId,
+        /// Of which channel.
+        channel: String,
+        /// The length of the column that differs.
+        found: usize,
+        /// The length of `time_s`.
+        expected: usize,
+    },
     /// A NIS of a dimension whose bounds are not tabulated.
     #[error("NIS series `{name}`: bounds are known for 1 to 6 degrees of freedom, found {found}")]
     NisDimension {

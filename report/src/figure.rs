@@ -14,6 +14,7 @@ pub struct Axis {
     scale: Scale,
     range: Option<(f64, f64)>,
     from_zero: bool,
+    categories: Vec<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +51,14 @@ impl Axis {
             scale: Scale::Linear,
             range: None,
             from_zero: false,
+            categories: Vec::new(),
         }
+    }
+
+    /// A vertical axis of the named categories in this order from the top, each labelled.
+    pub fn list(quantity: &str, categories: &[String]) -> Self {
+        let from_bottom = categories.iter().rev().map(|category| label(category)).collect();
+        Self { categories: from_bottom, ..Self::category(quantity) }
     }
 
     /// An axis of named categories.
@@ -98,6 +106,11 @@ impl Axis {
             Scale::Category => "category",
         };
         axis.insert("type".into(), kind.into());
+        if !self.categories.is_empty() {
+            axis.insert("categoryarray".into(), json!(self.categories));
+            axis.insert("range".into(), json!([-0.6, self.categories.len() as f64 - 0.4]));
+            axis.insert("dtick".into(), 1.into());
+        }
         if self.scale == Scale::Logarithmic {
             axis.insert("dtick".into(), 1.into());
             axis.insert("exponentformat".into(), "power".into());
@@ -179,7 +192,7 @@ impl Figure {
         let mut json = trace.json.clone();
         let row = trace.row.min(self.rows.len() - 1);
         json.insert("yaxis".into(), axis_name("y", row).into());
-        if !json.contains_key("hoverinfo") {
+        if !json.contains_key("hoverinfo") && !json.contains_key("hovertemplate") {
             let own = json.get("name").and_then(Value::as_str).unwrap_or_default();
             let name = trace.hover_name.as_deref().unwrap_or(own);
             let hover =

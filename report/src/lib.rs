@@ -7,6 +7,7 @@
 //! [`DemoReport`], [`ReplayReport`]), this crate draws them. Equal data give equal bytes; no clock is read.
 
 mod accuracy;
+mod card;
 mod chi_square;
 mod decimate;
 mod document;
@@ -24,16 +25,19 @@ mod table;
 mod trace;
 
 pub use accuracy::Accuracy;
+pub use card::Card;
 pub use chi_square::{CONFIDENCE_95_TWO_DIMENSIONS, two_sided_95};
 pub use decimate::{MAX_POINTS, even_sample, indices_keeping_extremes};
-pub use document::{Document, Panel, Verdict};
+pub use document::{Document, Panel, Tone, Verdict};
 pub use ellipse::ellipse_points;
 pub use error::ReportError;
 pub use figure::{Axis, Figure};
-pub use number::quantity;
+pub use number::{quantity, with_interval};
 pub use palette::{Colour, Dash, OKABE_ITO};
 pub use reports::{
-    DemoCase, DemoReport, FactCount, ReplayReport, RobotScore, demo_report, replay_report, run_report,
+    Claim, DemoCase, DemoReport, DiagnoseReport, DiagnosedRecording, Evidence, FactCount, Found,
+    HorizonError, NotTested, ParameterEstimate, ReplayReport, ResidualColumns, RobotRollOut, RobotScore,
+    STAGES, SmallestDetectable, StageTest, demo_report, diagnose_report, replay_report, run_report,
 };
 pub use series::{Landmark, NisPoint, NisSeries, RobotSeries, TeamSeries};
 pub use summary::{summary_text, write_summary};

@@ -25,6 +25,41 @@ pub fn quantity(value: f64, unit: &str) -> String {
     if unit.is_empty() { number } else { format!("{number} {unit}") }
 }
 
+/// An estimate with its 95 % confidence interval (`1.00 % (0.97..1.03 %)`), with as many decimals as the
+/// interval supports; the estimate alone where the interval is unknown.
+pub fn with_interval(value: f64, ci95: [f64; 2], unit: &str) -> String {
+    let half_width = (ci95[1] - ci95[0]).abs() / 2.0;
+    let unit = if unit.is_empty() || unit == "1" { String::new() } else { format!(" {unit}") };
+    if !half_width.is_finite() || !value.is_finite() {
+        return format!("{}{unit} (interval unknown)", quantity(value, ""));
+    }
+    let decimals = decimals_for(if half_width > 0.0 { half_width } else { value.abs() / 100.0 });
+    // Minus zero would read oddly.
+    let at = |value: f64| format!("{:.decimals$}", if value == 0.0 { 0.0 } else { value });
+    format!("{}{unit} ({}..{}{unit})", at(value), at(ci95[0]), at(ci95[1]))
+}
+
+/// A size of which only the order and a second digit matter (`0.0021`).
+pub(crate) fn two_digits(value: f64) -> String {
+    if !value.is_finite() || value == 0.0 || !(1e-6..1e6).contains(&value.abs()) {
+        return quantity(value, "");
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=7")]
+    let decimals = (1.0 - value.abs().log10().floor()).clamp(0.0, 7.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// Decimals that show one significant digit of `width`, two of one that begins with 1 or 2; at most nine.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=9")]
+fn decimals_for(width: f64) -> usize {
+    if width <= 0.0 {
+        return 0;
+    }
+    let decades = width.log10().floor();
+    let digits = if width / 10_f64.powf(decades) < 2.95 { 1.0 } else { 0.0 };
+    (digits - decades).clamp(0.0, 9.0) as usize
+}
+
 /// A whole number with its thousands apart (`12,345`).
 pub(crate) fn count(value: u64) -> String {
     let digits = value.to_string();
@@ -114,6 +149,29 @@ mod tests {
             assert_eq!(quantity(value, "m"), text);
         }
         assert_eq!(quantity(2.0, ""), "2.00");
+    }
+
+    #[test]
+    fn estimates_have_the_decimals_that_their_intervals_support() {
+        let cases = [
+            (1.0004, [0.9703, 1.0304], "%", "1.00 % (0.97..1.03 %)"),
+            (1.0004, [0.9903, 1.0104], "%", "1.000 % (0.990..1.010 %)"),
+            (12.0, [-3.1, 27.4], "ms", "12 ms (-3..27 ms)"),
+            (0.02, [0.02, 0.02], "m", "0.02000 m (0.02000..0.02000 m)"),
+            (0.5, [f64::NAN, 1.0], "m", "0.500 m (interval unknown)"),
+            (3.0, [2.0, 4.0], "1", "3.0 (2.0..4.0)"),
+        ];
+        for (value, ci95, unit, text) in cases {
+            assert_eq!(with_interval(value, ci95, unit), text);
+        }
+    }
+
+    #[test]
+    fn sizes_have_two_digits() {
+        let cases = [(0.002_09, "0.0021"), (3.12, "3.1"), (41.4, "41"), (0.0, "0"), (f64::NAN, "n/a")];
+        for (value, text) in cases {
+            assert_eq!(two_digits(value), text);
+        }
     }
 
     #[test]

@@ -94,6 +94,52 @@ impl Trace {
         Self::from_json(json, Thinning::None)
     }
 
+    /// Points over the named categories of a vertical axis.
+    pub fn dots(name: &str, x: &[f64], categories: &[String], colour: Colour, symbol: &str) -> Self {
+        let json = json!({
+            "type": "scatter",
+            "mode": "markers",
+            "name": label(name),
+            "x": compact(x),
+            "y": categories.iter().map(|category| label(category)).collect::<Vec<_>>(),
+            "marker": {
+                "color": colour.code(),
+                "symbol": symbol,
+                "size": 9,
+                "line": {"width": 1.5, "color": colour.code()},
+            },
+        });
+        Self::from_json(json, Thinning::None)
+    }
+
+    /// Squares of the plane around the centres `x` and `y`, coloured by `values[row of y][column of x]` from
+    /// `range.0` to `range.1`; those that are not finite stay clear. `quantity` names the colours.
+    pub fn cells(
+        name: &str,
+        x: &[f64],
+        y: &[f64],
+        values: &[Vec<f64>],
+        range: (f64, f64),
+        quantity: &str,
+    ) -> Self {
+        let json = json!({
+            "type": "heatmap",
+            "name": label(name),
+            "x": compact(x),
+            "y": compact(y),
+            "z": values.iter().map(|row| compact(row)).collect::<Vec<_>>(),
+            "zmin": range.0,
+            "zmax": range.1,
+            // Cividis, Nunez et al. 2018: even steps of brightness, the same with any colour vision.
+            "colorscale": "Cividis",
+            "colorbar": {"title": {"text": label(quantity), "side": "right"}, "thickness": 12, "outlinewidth": 0},
+            "showlegend": false,
+            "hoverongaps": false,
+            "hovertemplate": format!("x %{{x:.2f}} m<br>y %{{y:.2f}} m<br>{} %{{z:.3~r}}<extra></extra>", label(quantity)),
+        });
+        Self::from_json(json, Thinning::None)
+    }
+
     /// The pattern of the line.
     pub fn dash(self, dash: Dash) -> Self {
         self.with_line("dash", dash.code().into())

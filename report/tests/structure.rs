@@ -9,10 +9,12 @@ use pleiad_report::{
     ReplayReport, ReportError, RobotScore, RobotSeries, Table, TeamSeries, Trace, Verdict, demo_report,
     replay_report, run_report,
 };
-use serde_json::Value;
+
+mod page;
+
+use page::{PLOTLY, check_figures, figures, outside_references};
 
 const HOSTILE: &str = "</script><script>alert('x')</script><img src=\"http://evil.example/\" onerror=a&b>";
-const PLOTLY: &str = include_str!("../assets/plotly-cartesian.min.js");
 
 fn team(robots: u32, instants: usize) -> TeamSeries {
     let series = |robot: u32| {
@@ -85,57 +87,11 @@ fn replay(name: &str, robots: u32, instants: usize) -> ReplayReport {
     }
 }
 
-/// The data of every figure of a rendered report.
-fn figures(html: &str) -> Vec<Value> {
-    html.split("<script type=\"application/json\">")
-        .skip(1)
-        .map(|rest| serde_json::from_str(rest.split("</script>").next().unwrap()).unwrap())
-        .collect()
-}
-
-fn check_figures(html: &str) {
-    let figures = figures(html);
-    assert!(!figures.is_empty());
-    for figure in figures {
-        let axes = figure["layout"].as_object().unwrap().iter().filter(|(key, _)| key.contains("axis"));
-        for (key, axis) in axes {
-            let title = axis["title"]["text"].as_str().unwrap();
-            let has_unit = title.ends_with(')') && title.contains(" (");
-            assert!(has_unit || axis["type"] == "category", "{key} without unit: {title}");
-        }
-        for trace in figure["data"].as_array().unwrap() {
-            let (x, y) = (trace["x"].as_array().unwrap(), trace["y"].as_array().unwrap());
-            assert_eq!(x.len(), y.len(), "{}", trace["name"]);
-            assert!(y.iter().any(Value::is_number), "nothing to see in {}", trace["name"]);
-            assert!(!trace["name"].as_str().unwrap().is_empty());
-        }
-    }
-}
-
 #[test]
 fn every_figure_of_every_report_has_units_and_data() {
     check_figures(&demo_report(&demo("relative only", 200)).unwrap().render());
     check_figures(&replay_report(&replay("mrclam-1", 2, 200)).unwrap().render());
     check_figures(&run_report(&replay("arena", 2, 200)).unwrap().render());
-}
-
-/// What would make a browser leave the file: none of it may occur outside the library.
-fn outside_references(html: &str) -> Vec<String> {
-    let own = html.replace(PLOTLY, "");
-    let calls =
-        ["fetch(", "XMLHttpRequest", "WebSocket", "EventSource", "sendBeacon", "import(", "@import", "url("];
-    let attributes = [" src=", " href=", "<link", "<iframe", "<base", "<object", "<embed"];
-    let mut found: Vec<String> = calls
-        .iter()
-        .chain(&attributes)
-        .filter(|&&sign| own.contains(sign))
-        .map(|&sign| sign.to_owned())
-        .collect();
-    found.extend(
-        own.match_indices("://")
-            .map(|(at, _)| own[at.saturating_sub(8)..].chars().take(40).collect::<String>()),
-    );
-    found
 }
 
 #[test]

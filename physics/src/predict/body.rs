@@ -1,6 +1,6 @@
 //! The motion of the body, predicted from encoders.
 
-use crate::chain::actuator::Scheduled;
+use crate::chain::actuator::{Scheduled, turn};
 use crate::chain::body::{BodyState, advance};
 use crate::chain::robot::Robot;
 use crate::chain::sensors;
@@ -10,8 +10,9 @@ use crate::pose::Pose;
 use crate::predict::actuator::CommandWindow;
 use crate::scalar::Scalar;
 
-/// The longest step in which a state-dependent effect is taken from the beginning of the step, seconds.
-const COMMANDED_STEP_S: f64 = 0.02;
+/// The longest step of a window driven by commands, seconds. State-dependent effects are taken from the
+/// beginning of a step, those of the actuator at the heading in its middle.
+const COMMANDED_STEP_S: f64 = 0.05;
 
 /// A sample of the wheels' cumulative angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,7 +121,7 @@ fn seen_by_truth<S: Scalar>(model: &RobotModel<S>, motion: Motion<S>, time_s: f6
 
 /// The motion that the reference system sees over a window that is driven by commands alone, for
 /// recordings without encoders. `robot` keeps servo and body from window to window; it is put to the
-/// window's beginning and driven in steps of about 20 ms.
+/// window's beginning and driven in steps of about 50 ms.
 pub fn commanded_truth_change<S: Scalar>(
     model: &RobotModel<S>,
     scheduled: &[Scheduled<S>],
@@ -138,9 +139,36 @@ pub fn commanded_truth_change<S: Scalar>(
     // The cast saturates: a window is never that long.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     for _ in 0..steps as u32 {
-        robot.drive(model, scheduled, window.surroundings, duration_s / steps);
+        drive(model, scheduled, window.surroundings, duration_s / steps, robot);
     }
     first.between(&seen_by_truth(model, robot.motion, window.to_s))
+}
+
+/// A coarse step: like [`Robot::drive`], with the loads on the servo at the heading in the step's middle.
+fn drive<S: Scalar>(
+    model: &RobotModel<S>,
+    scheduled: &[Scheduled<S>],
+    surroundings: Surroundings,
+    step_s: f64,
+    robot: &mut Robot<S>,
+) {
+    let until_s = robot.time_s + step_s;
+    let mut context = Context {
+        surroundings,
+        ..Context::new(&model.nominal, robot.time_s, robot.motion).over(S::constant(step_s))
+    };
+    context.motion.pose.yaw_rad += robot.motion.yaw_rate_rad_s * (0.5 * step_s);
+    let turned = turn(model, &context, scheduled, (robot.time_s, until_s), &mut robot.actuator);
+    context.motion.pose = robot.motion.pose;
+    let step = advance(model, &context, turned, &mut robot.body);
+    robot.motion.pose = step.pose;
+    robot.motion.speed_m_s = step.speed_m_s;
+    robot.motion.yaw_rate_rad_s = step.yaw_rate_rad_s;
+    robot.motion.acceleration_m_s2 = step.acceleration_m_s2;
+    for (angle, wheel) in robot.motion.wheel_angle_rad.iter_mut().zip(turned) {
+        *angle += wheel;
+    }
+    robot.time_s = until_s;
 }
 
 /// The mean yaw rate that the gyro reads over the window, rad/s.

@@ -3,6 +3,7 @@
 mod agent;
 mod coordinator;
 mod demo;
+mod diagnose;
 mod effects;
 mod observability;
 mod replay;
@@ -22,6 +23,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Replay(args) => replay::run(&args),
         Command::Observability(args) => observability::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Agent(args) => agent::run(&args),
         Command::Coordinator(args) => coordinator::run(&args),

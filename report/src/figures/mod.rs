@@ -1,6 +1,7 @@
 //! The figures of localization: maps, sigmas, errors, innovations, comparisons.
 
 mod bars;
+pub(crate) mod diagnose;
 mod error;
 mod map;
 mod nis;

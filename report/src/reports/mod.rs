@@ -1,9 +1,14 @@
 //! The reports of the commands.
 
 mod demo;
+pub(crate) mod diagnose;
 mod replay;
 
 pub use demo::{DemoCase, DemoReport, demo_report};
+pub use diagnose::{
+    Claim, DiagnoseReport, DiagnosedRecording, Evidence, Found, HorizonError, NotTested, ParameterEstimate,
+    ResidualColumns, RobotRollOut, STAGES, SmallestDetectable, StageTest, diagnose_report,
+};
 pub use replay::{FactCount, ReplayReport, RobotScore, replay_report, run_report};
 
 /// Caption of what a map shows, shared by all reports.

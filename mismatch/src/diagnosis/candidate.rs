@@ -1,0 +1,207 @@
+//! Effects that could be added to a hypothesis, linearized where their search begins.
+
+use std::sync::Arc;
+
+use pleiad_physics::{Effect, Region, Variable};
+
+use crate::channel::Channel;
+use crate::diagnosis::fit::{State, residuals};
+use crate::diagnosis::starts::{Placing, Start, onsets, regions, starts};
+use crate::diagnosis::term::{Term, Whose};
+use crate::diagnosis::touch::touches;
+use crate::diagnosis::unit::{Column, Row, Stretch, Unit};
+
+/// An impulse is looked for at so many of the largest residuals.
+const IMPULSES: usize = 8;
+
+/// Columns per unit that an effect acts on: the unit's position and its columns.
+pub(crate) type Columns = Vec<(usize, Vec<Column>)>;
+
+/// A start of an effect with its columns.
+#[derive(Clone, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) term: Term,
+    /// Parameters that the columns are derivatives by; empty for one column that is the effect itself at the
+    /// values of the term.
+    pub(crate) along: Vec<usize>,
+    /// Columns, of the effect always and everywhere if it has an onset or a region.
+    base: Arc<Columns>,
+    /// Whether rows before the onset or outside the region of the term are to be blanked.
+    masked: bool,
+}
+
+impl Candidate {
+    /// The columns at the onset and in the region of the term.
+    pub(crate) fn columns(&self, units: &[&Unit<'_>]) -> Columns {
+        if !self.masked {
+            return (*self.base).clone();
+        }
+        let placing = Placing::of(self.term.effect.info());
+        let values = &self.term.values;
+        let from_s = placing.onset.map(|onset| values[onset]);
+        let region = placing.region.map(|first| {
+            Region::from_bounds([values[first], values[first + 1], values[first + 2], values[first + 3]])
+        });
+        let inside = |row: &Row| {
+            from_s.is_none_or(|from_s| row.time_s >= from_s)
+                && region.is_none_or(|region| {
+                    row.regime.pose.is_some_and(|pose| region.contains(pose.position()))
+                })
+        };
+        let blank = |unit: &Unit<'_>, column: &Column| {
+            let part = |(part, stretch): (&Option<Vec<f64>>, &Stretch)| {
+                let rows = &unit.rows[stretch.range()];
+                let keep = |(value, row): (&f64, &Row)| if inside(row) { *value } else { 0.0 };
+                part.as_ref().map(|part| part.iter().zip(rows).map(keep).collect())
+            };
+            Column { parts: column.parts.iter().zip(&unit.stretches).map(part).collect() }
+        };
+        let of_unit = |(unit, columns): &(usize, Vec<Column>)| {
+            (*unit, columns.iter().map(|column| blank(units[*unit], column)).collect())
+        };
+        self.base.iter().map(of_unit).collect()
+    }
+
+    /// Whether onset or region can be moved without a new linearization.
+    pub(crate) fn is_placed(&self) -> bool {
+        self.masked
+    }
+}
+
+/// Linearizes an effect at all its starts beside the terms of a hypothesis. Starts that show nowhere are left
+/// out; parameters that do not show stay at their values.
+pub(crate) fn candidates(
+    effect: Effect,
+    whose: Whose,
+    units: &[&Unit<'_>],
+    terms: &[Term],
+    states: &[State],
+) -> Vec<Candidate> {
+    let own: Vec<usize> = (0..units.len()).filter(|&unit| acts(whose, units[unit])).collect();
+    let acting: Vec<&Unit<'_>> = own.iter().map(|&unit| units[unit]).collect();
+    let placing = Placing::of(effect.info());
+    let linearized = |start: &Start| {
+        let term = Term::new(effect, whose, start.values.clone());
+        let columns: Vec<Vec<Column>> =
+            own.iter().map(|&unit| linearized(units[unit], &term, start, terms, &states[unit])).collect();
+        shown(term, start, &own, columns)
+    };
+    let mut found = Vec::new();
+    for mut start in starts(effect, &acting) {
+        if !placing.is_some() {
+            found.extend(linearized(&start));
+            continue;
+        }
+        placing.widen(&mut start.values);
+        if let Some(everywhere) = linearized(&start) {
+            found.extend(placed(&everywhere, placing, &acting));
+        } else if let Some(onset) = placing.onset {
+            for time_s in largest(effect, &own, units, states) {
+                start.values[onset] = time_s;
+                found.extend(linearized(&start));
+            }
+        }
+    }
+    found
+}
+
+/// The candidate at every onset and in every region.
+fn placed(everywhere: &Candidate, placing: Placing, units: &[&Unit<'_>]) -> Vec<Candidate> {
+    let mut all = vec![Candidate { masked: true, ..everywhere.clone() }];
+    if let Some(onset) = placing.onset {
+        all = expand(&all, &onsets(units), |values, time_s| values[onset] = time_s);
+    }
+    if let Some(first) = placing.region {
+        all = expand(&all, &regions(units), |values, region: [f64; 4]| {
+            values[first..first + 4].copy_from_slice(&region);
+        });
+    }
+    all
+}
+
+fn expand<V: Copy>(all: &[Candidate], places: &[V], set: impl Fn(&mut [f64], V)) -> Vec<Candidate> {
+    let mut expanded = Vec::with_capacity(all.len() * places.len());
+    for candidate in all {
+        for &place in places {
+            let mut next = candidate.clone();
+            set(&mut next.term.values, place);
+            expanded.push(next);
+        }
+    }
+    expanded
+}
+
+/// The times of the largest residuals in the channels of an effect, the largest first.
+fn largest(effect: Effect, own: &[usize], units: &[&Unit<'_>], states: &[State]) -> Vec<f64> {
+    let mut sizes: Vec<(f64, f64)> = Vec::new();
+    for &unit in own {
+        let (unit, state) = (units[unit], &states[unit]);
+        for stretch in unit.stretches.iter().filter(|stretch| touches(effect, stretch.channel)) {
+            sizes.extend(stretch.range().map(|index| {
+                let z = state.residuals[index] / state.noise.sigma[index];
+                (z.abs(), unit.rows[index].time_s)
+            }));
+        }
+    }
+    sizes.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.total_cmp(&b.1)));
+    let mut times: Vec<f64> = Vec::new();
+    for (_, time_s) in sizes {
+        if times.len() == IMPULSES {
+            break;
+        }
+        if !times.iter().any(|known| (known - time_s).abs() < 1e-9) {
+            times.push(time_s);
+        }
+    }
+    times
+}
+
+fn acts(whose: Whose, unit: &Unit<'_>) -> bool {
+    match whose {
+        Whose::Robot(robot) => robot == unit.robot,
+        Whose::Everyone => true,
+    }
+}
+
+fn linearized(unit: &Unit<'_>, term: &Term, start: &Start, terms: &[Term], state: &State) -> Vec<Column> {
+    let channels = |channel: Channel| touches(term.effect, channel);
+    if start.along.is_empty() {
+        let mut all = terms.to_vec();
+        all.push(term.clone());
+        let Some(there) = residuals(unit, &all, &channels, Some(&state.residuals)) else {
+            return vec![Column::empty(unit)];
+        };
+        let part = |stretch: &Stretch| {
+            let range = stretch.range();
+            let difference: Vec<f64> =
+                there[range.clone()].iter().zip(&state.residuals[range]).map(|(a, b)| a - b).collect();
+            difference.iter().any(|value| *value != 0.0).then_some(difference)
+        };
+        return vec![Column { parts: unit.stretches.iter().map(part).collect() }];
+    }
+    let mut model = unit.model(terms);
+    let index = model.effects.len();
+    model.effects.push(term.active());
+    let variables: Vec<Variable> =
+        start.along.iter().map(|&parameter| Variable::Effect { index, parameter }).collect();
+    unit.columns(&model, &variables, &channels)
+}
+
+/// Keeps the columns that show somewhere.
+fn shown(mut term: Term, start: &Start, own: &[usize], columns: Vec<Vec<Column>>) -> Option<Candidate> {
+    let count = columns.first()?.len();
+    let shows: Vec<bool> =
+        (0..count).map(|index| columns.iter().any(|columns| !columns[index].is_zero())).collect();
+    if !shows.contains(&true) {
+        return None;
+    }
+    for (&parameter, &shows) in start.along.iter().zip(&shows) {
+        term.free[parameter] = term.free[parameter] && shows;
+    }
+    let along = start.along.iter().zip(&shows).filter(|(_, shows)| **shows).map(|(index, _)| *index).collect();
+    let keep = |columns: Vec<Column>| -> Vec<Column> {
+        columns.into_iter().zip(&shows).filter(|(_, shows)| **shows).map(|(column, _)| column).collect()
+    };
+    let columns: Columns = own.iter().copied().zip(columns.into_iter().map(keep)).collect();
+    Some(Candidate { term, along, base: Arc::new(columns), masked: false })
+}

@@ -1,0 +1,282 @@
+//! Maximum likelihood of the parameters of effects: Gauss-Newton with re-linearization, damped
+//! (`marquardt1963`), on residuals whose pull is bounded and whose noise is estimated along with them.
+
+use nalgebra::{DMatrix, DVector};
+use pleiad_physics::Variable;
+
+use crate::channel::Channel;
+use crate::diagnosis::noise::{self, Noise};
+use crate::diagnosis::term::Term;
+use crate::diagnosis::touch::touches;
+use crate::diagnosis::unit::{Column, Unit};
+
+/// Largest number of re-linearizations.
+const ITERATIONS: usize = 15;
+/// A fit has converged if a step lowers the cost by less than this.
+const CONVERGED: f64 = 1e-4;
+/// Steps are given up at this damping.
+const MAX_DAMPING: f64 = 1e8;
+
+/// A parameter: the position of its term and its position in the term.
+pub(crate) type Slot = (usize, usize);
+
+/// What a unit looks like under the terms of a fit.
+#[derive(Clone, Debug)]
+pub(crate) struct State {
+    pub(crate) residuals: Vec<f64>,
+    pub(crate) noise: Noise,
+}
+
+/// Fitted terms.
+#[derive(Clone, Debug)]
+pub(crate) struct Fit {
+    pub(crate) terms: Vec<Term>,
+    /// One per unit.
+    pub(crate) states: Vec<State>,
+    /// The parameters that were fitted.
+    pub(crate) slots: Vec<Slot>,
+    /// Derivatives of each unit's residuals with respect to the parameters, by unit, then parameter.
+    pub(crate) columns: Vec<Vec<Column>>,
+    /// Log-likelihood with the noise profiled out.
+    pub(crate) log_likelihood: f64,
+}
+
+/// Residuals of every unit under terms; `None` if a prediction is no finite number.
+pub(crate) fn states(units: &[&Unit<'_>], terms: &[Term]) -> Option<Vec<State>> {
+    let state = |unit: &&Unit<'_>| {
+        let residuals = residuals(unit, terms, &|_| true, None)?;
+        Some(State { noise: noise::estimate(unit, &residuals), residuals })
+    };
+    units.iter().map(state).collect()
+}
+
+/// Residuals of a unit; those of channels that are not asked for are taken from `known`.
+pub(crate) fn residuals(
+    unit: &Unit<'_>,
+    terms: &[Term],
+    channels: &dyn Fn(Channel) -> bool,
+    known: Option<&[f64]>,
+) -> Option<Vec<f64>> {
+    let wanted = |channel: Channel| known.is_none() || channels(channel);
+    let mut all = known.map_or_else(|| vec![0.0; unit.rows.len()], <[f64]>::to_vec);
+    let values = unit.values(&unit.model(terms), &wanted);
+    for (stretch, values) in unit.stretches.iter().zip(values) {
+        match values {
+            Some(values) => all[stretch.range()].copy_from_slice(&values),
+            None if stretch.rows > 0 && wanted(stretch.channel) => return None,
+            None => {}
+        }
+    }
+    Some(all)
+}
+
+/// Fits the terms for which `movable` holds, starting at their values and, if given, at what the units look
+/// like under them. `None` if the model predicts no finite numbers at the start.
+pub(crate) fn fit(
+    units: &[&Unit<'_>],
+    terms: Vec<Term>,
+    movable: &dyn Fn(usize) -> bool,
+    from: Option<Vec<State>>,
+) -> Option<Fit> {
+    let mut terms = terms;
+    let mut states = match from {
+        Some(states) => states,
+        None => states_of(units, &terms)?,
+    };
+    let mut slots = free_slots(&terms, movable);
+    let mut found = all_columns(units, &terms, &slots);
+    // What shows nowhere cannot be fitted.
+    let shows: Vec<bool> =
+        (0..slots.len()).map(|slot| found.iter().any(|columns| !columns[slot].is_zero())).collect();
+    keep(&mut slots, &shows);
+    for columns in &mut found {
+        keep(columns, &shows);
+    }
+    let mut damping = 1e-4;
+    for _ in 0..ITERATIONS {
+        if slots.is_empty() {
+            break;
+        }
+        let normal = Normal::new(units, &states, &found, slots.len());
+        let Some(step) = improve(units, &states, &terms, &slots, &normal, &mut damping) else { break };
+        terms = step.terms;
+        for ((state, residuals), unit) in states.iter_mut().zip(step.residuals).zip(units) {
+            state.noise = noise::estimate(unit, &residuals);
+            state.residuals = residuals;
+        }
+        found = all_columns(units, &terms, &slots);
+        if step.gain < CONVERGED {
+            break;
+        }
+    }
+    let log_likelihood = states.iter().map(|state| state.noise.log_likelihood).sum();
+    Some(Fit { terms, states, slots, columns: found, log_likelihood })
+}
+
+use self::states as states_of;
+
+struct Step {
+    terms: Vec<Term>,
+    residuals: Vec<Vec<f64>>,
+    /// By how much the cost at fixed noise fell.
+    gain: f64,
+}
+
+/// A damped step that lowers the cost, if there is one.
+fn improve(
+    units: &[&Unit<'_>],
+    states: &[State],
+    terms: &[Term],
+    slots: &[Slot],
+    normal: &Normal,
+    damping: &mut f64,
+) -> Option<Step> {
+    let before: f64 = states.iter().map(|state| cost(state, &state.residuals)).sum();
+    let moving = |channel: Channel| slots.iter().any(|&(term, _)| touches(terms[term].effect, channel));
+    while *damping < MAX_DAMPING {
+        if let Some(step) = normal.step(*damping) {
+            let moved = stepped(terms, slots, &step);
+            let evaluate = |(unit, state): (&&Unit<'_>, &State)| {
+                residuals(unit, &moved, &moving, Some(&state.residuals))
+            };
+            let residuals: Option<Vec<_>> = units.iter().zip(states).map(evaluate).collect();
+            if let Some(residuals) = residuals {
+                let after: f64 =
+                    states.iter().zip(&residuals).map(|(state, residuals)| cost(state, residuals)).sum();
+                if after < before {
+                    *damping = (*damping * 0.1).max(1e-9);
+                    return Some(Step { terms: moved, residuals, gain: before - after });
+                }
+            }
+        }
+        *damping *= 10.0;
+    }
+    None
+}
+
+fn stepped(terms: &[Term], slots: &[Slot], step: &DVector<f64>) -> Vec<Term> {
+    let mut moved = terms.to_vec();
+    for (&(term, parameter), change) in slots.iter().zip(step.iter()) {
+        moved[term].values[parameter] += change;
+    }
+    for term in &mut moved {
+        term.clamp();
+    }
+    moved
+}
+
+/// The cost of residuals at the noise of a state.
+fn cost(state: &State, residuals: &[f64]) -> f64 {
+    let of = |(value, sigma): (&f64, &f64)| noise::rho(value / sigma);
+    0.5 * residuals.iter().zip(&state.noise.sigma).map(of).sum::<f64>()
+}
+
+/// The parameters of movable terms that are no labels.
+fn free_slots(terms: &[Term], movable: &dyn Fn(usize) -> bool) -> Vec<Slot> {
+    let mut slots = Vec::new();
+    for (index, term) in terms.iter().enumerate().filter(|(index, _)| movable(*index)) {
+        slots.extend((0..term.values.len()).filter(|&value| term.free[value]).map(|value| (index, value)));
+    }
+    slots
+}
+
+fn keep<T>(items: &mut Vec<T>, which: &[bool]) {
+    let mut which = which.iter();
+    items.retain(|_| which.next().copied().unwrap_or(true));
+}
+
+fn all_columns(units: &[&Unit<'_>], terms: &[Term], slots: &[Slot]) -> Vec<Vec<Column>> {
+    units.iter().map(|unit| columns(unit, terms, slots)).collect()
+}
+
+/// Columns of all slots for a unit; those of terms that do not act on it are empty.
+pub(crate) fn columns(unit: &Unit<'_>, terms: &[Term], slots: &[Slot]) -> Vec<Column> {
+    let mut all = vec![Column::empty(unit); slots.len()];
+    let model = unit.model(terms);
+    let mut position = unit.nominal.effects.len();
+    for (index, term) in terms.iter().enumerate() {
+        if !term.acts_on(unit.robot) {
+            continue;
+        }
+        // The slots of a term go together: they touch the same channels.
+        let own: Vec<usize> = (0..slots.len()).filter(|&slot| slots[slot].0 == index).collect();
+        let variables: Vec<Variable> = own
+            .iter()
+            .map(|&slot| Variable::Effect { index: position, parameter: slots[slot].1 })
+            .collect();
+        let found = unit.columns(&model, &variables, &|channel| touches(term.effect, channel));
+        for (slot, column) in own.into_iter().zip(found) {
+            all[slot] = column;
+        }
+        position += 1;
+    }
+    all
+}
+
+/// The normal equations of a linearization: information and gradient of the log-likelihood.
+pub(crate) struct Normal {
+    pub(crate) information: DMatrix<f64>,
+    pub(crate) gradient: DVector<f64>,
+}
+
+impl Normal {
+    /// From columns of `size` parameters per unit.
+    pub(crate) fn new(units: &[&Unit<'_>], states: &[State], columns: &[Vec<Column>], size: usize) -> Self {
+        let mut normal = Self { information: DMatrix::zeros(size, size), gradient: DVector::zeros(size) };
+        for ((unit, state), columns) in units.iter().zip(states).zip(columns) {
+            for which in 0..unit.stretches.len() {
+                normal.add(unit, state, columns, which);
+            }
+        }
+        for row in 0..size {
+            for column in row + 1..size {
+                normal.information[(row, column)] = normal.information[(column, row)];
+            }
+        }
+        normal
+    }
+
+    /// Adds a stretch to the lower triangle.
+    fn add(&mut self, unit: &Unit<'_>, state: &State, columns: &[Column], which: usize) {
+        let present: Vec<(usize, &[f64])> = columns
+            .iter()
+            .enumerate()
+            .filter_map(|(slot, column)| Some((slot, column.parts[which].as_deref()?)))
+            .collect();
+        if present.is_empty() {
+            return;
+        }
+        let range = unit.stretches[which].range();
+        let (residuals, sigmas) = (&state.residuals[range.clone()], &state.noise.sigma[range]);
+        for (row, (&residual, &sigma)) in residuals.iter().zip(sigmas).enumerate() {
+            let weight = noise::weight(residual / sigma) / (sigma * sigma);
+            for (position, &(slot, part)) in present.iter().enumerate() {
+                let weighted = weight * part[row];
+                if weighted == 0.0 {
+                    continue;
+                }
+                self.gradient[slot] -= weighted * residual;
+                for &(other, other_part) in &present[..=position] {
+                    self.information[(slot, other)] += weighted * other_part[row];
+                }
+            }
+        }
+    }
+
+    /// The step of these equations with the diagonal raised by a share.
+    fn step(&self, damping: f64) -> Option<DVector<f64>> {
+        // Scaled to a unit diagonal, so that units of parameters do not matter.
+        let size = self.gradient.len();
+        let scale: Vec<f64> =
+            (0..size).map(|slot| self.information[(slot, slot)].sqrt().max(f64::MIN_POSITIVE)).collect();
+        let mut scaled =
+            DMatrix::from_fn(size, size, |row, column| self.information[(row, column)] / scale[row] / scale[column]);
+        for slot in 0..size {
+            scaled[(slot, slot)] += damping;
+        }
+        let right = DVector::from_fn(size, |slot, _| self.gradient[slot] / scale[slot]);
+        let solved = scaled.cholesky()?.solve(&right);
+        let step = DVector::from_fn(size, |slot, _| solved[slot] / scale[slot]);
+        step.iter().all(|change| change.is_finite()).then_some(step)
+    }
+}

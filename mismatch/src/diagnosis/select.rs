@@ -1,0 +1,313 @@
+//! Forward selection of effects, with re-linearization after each, and pruning.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use pleiad_physics::Effect;
+
+use crate::diagnosis::candidate::{Candidate, candidates};
+use crate::diagnosis::chi_square::upper_tail;
+use crate::diagnosis::fit::{Fit, fit};
+use crate::diagnosis::parallel;
+use crate::diagnosis::refine::refine;
+use crate::diagnosis::term::{Term, Whose};
+use crate::diagnosis::touch::touches;
+use crate::diagnosis::unit::Unit;
+use crate::diagnosis::white::{Step, White, step};
+
+/// Probability that anything is found in a clean recording, over everything that is tried in it.
+pub(crate) const FAMILYWISE: f64 = 0.002;
+/// An effect enters only if it gains more than this, twice in log-likelihood.
+const LEAST_GAIN: f64 = 20.0;
+/// A term is dropped if it is this likely without the effect.
+const PRUNE: f64 = 1e-4;
+/// So many rivals are fitted before one is chosen.
+const RIVALS: usize = 8;
+/// The most terms of a robot.
+const MOST_TERMS: usize = 12;
+/// A step from "off" to a start is a sound guess if the data want between these multiples of it.
+const SOUND_STEP: std::ops::RangeInclusive<f64> = 0.2..=4.0;
+
+/// An effect and whose it could be.
+pub(crate) type Entry = (Effect, Whose);
+
+/// A candidate with its step.
+#[derive(Clone, Debug)]
+pub(crate) struct Scored {
+    pub(crate) candidate: Candidate,
+    pub(crate) step: Step,
+    /// Probability of as strong a step without the effect, at this start alone.
+    pub(crate) p: f64,
+}
+
+/// A hypothesis: what is fitted, and how it was found.
+pub(crate) struct Selected {
+    pub(crate) fit: Fit,
+    /// How many starts were tried: what a probability is multiplied by.
+    pub(crate) tests: usize,
+}
+
+/// Adds effects from `entries` as long as one is significant; prunes.
+pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry]) -> Option<Selected> {
+    let mut current = fit(units, Vec::new(), &|_| true, None)?;
+    let mut pool = Pool::default();
+    let mut tests = 0;
+    for _ in 0..MOST_TERMS {
+        let scored = pool.scored(units, entries, &current);
+        tests = tests.max(scored.len());
+        let whites = whites(units, &current);
+        let added = additions(units, &whites, &current, &scored, tests);
+        if added.is_empty() {
+            break;
+        }
+        let mut terms = current.terms.clone();
+        terms.extend(added);
+        current = fit(units, terms, &|_| true, None)?;
+        pool.forget(&current.terms);
+    }
+    let fit = prune(units, current)?;
+    Some(Selected { fit, tests })
+}
+
+/// Linearized candidates, kept as long as no term is added that shows in the same channels.
+#[derive(Default)]
+struct Pool {
+    known: BTreeMap<Entry, Vec<Candidate>>,
+    terms: usize,
+}
+
+impl Pool {
+    fn scored(&mut self, units: &[&Unit<'_>], entries: &[Entry], current: &Fit) -> Vec<Scored> {
+        let open: Vec<Entry> = entries
+            .iter()
+            .copied()
+            .filter(|&(effect, whose)| {
+                !current.terms.iter().any(|term| term.effect == effect && overlap(term.whose, whose))
+            })
+            .collect();
+        let missing: Vec<Entry> =
+            open.iter().copied().filter(|entry| !self.known.contains_key(entry)).collect();
+        let found = parallel::map(&missing, |&(effect, whose)| {
+            candidates(effect, whose, units, &current.terms, &current.states)
+        });
+        self.known.extend(missing.into_iter().zip(found));
+        let whites: Vec<White<'_, '_>> = whites(units, current);
+        let scores = parallel::map(&open, |entry| {
+            self.known[entry].iter().filter_map(|candidate| score(units, &whites, candidate)).collect::<Vec<_>>()
+        });
+        scores.into_iter().flatten().collect()
+    }
+
+    /// Forgets what the terms added last have changed.
+    fn forget(&mut self, terms: &[Term]) {
+        let added = &terms[self.terms.min(terms.len())..];
+        self.known.retain(|&(effect, whose), _| {
+            !added.iter().any(|term| {
+                overlap(term.whose, whose)
+                    && crate::channel::Channel::ALL.iter().any(|&channel| {
+                        touches(effect, channel) && touches(term.effect, channel)
+                    })
+            })
+        });
+        self.terms = terms.len();
+    }
+}
+
+pub(crate) fn overlap(a: Whose, b: Whose) -> bool {
+    a == Whose::Everyone || b == Whose::Everyone || a == b
+}
+
+pub(crate) fn whites<'u, 'a>(units: &[&'u Unit<'a>], fit: &'u Fit) -> Vec<White<'u, 'a>> {
+    let each = units.iter().zip(&fit.states).zip(&fit.columns);
+    each.map(|((unit, state), columns)| White::new(unit, state, columns)).collect()
+}
+
+pub(crate) fn score(
+    units: &[&Unit<'_>],
+    whites: &[White<'_, '_>],
+    candidate: &Candidate,
+) -> Option<Scored> {
+    let all = candidate.columns(units);
+    let own: Vec<&White<'_, '_>> = all.iter().map(|(unit, _)| &whites[*unit]).collect();
+    let columns: Vec<&[_]> = all.iter().map(|(_, columns)| columns.as_slice()).collect();
+    let mut step = step(&own, &columns)?;
+    if candidate.along.is_empty() {
+        // The effect is there as a whole or not at all: the gain is that of a step of one.
+        let change = step.change[0];
+        if !SOUND_STEP.contains(&change) {
+            return None;
+        }
+        step.gain *= (2.0 - 1.0 / change) / change;
+    }
+    let p = upper_tail(step.wald, step.change.len());
+    Some(Scored { candidate: candidate.clone(), step, p })
+}
+
+impl Scored {
+    fn entry(&self) -> Entry {
+        (self.candidate.term.effect, self.candidate.term.whose)
+    }
+
+    /// Gain of twice the log-likelihood, deflated by how much errors are correlated.
+    pub(crate) fn gain(&self) -> f64 {
+        self.step.gain / self.step.inflation.max(1.0)
+    }
+
+    /// The term where the step ends.
+    pub(crate) fn term(&self) -> Term {
+        let mut term = self.candidate.term.clone();
+        for (&parameter, change) in self.candidate.along.iter().zip(self.step.change.iter()) {
+            term.values[parameter] += change;
+        }
+        term.clamp();
+        term
+    }
+}
+
+/// The best start of every entry that is significant, the strongest first.
+fn significant(scored: &[Scored], tests: usize) -> Vec<&Scored> {
+    let mut best: BTreeMap<Entry, &Scored> = BTreeMap::new();
+    for one in scored {
+        if one.p * tests as f64 >= FAMILYWISE || one.gain() <= LEAST_GAIN {
+            continue;
+        }
+        let known = best.entry(one.entry()).or_insert(one);
+        if one.step.gain > known.step.gain {
+            *known = one;
+        }
+    }
+    let mut all: Vec<&Scored> = best.into_values().collect();
+    // By the likelihood alone: how much errors are correlated depends on what is still missing, and would
+    // favour what explains little.
+    all.sort_by(|a, b| b.step.gain.total_cmp(&a.step.gain));
+    all
+}
+
+/// What to add: the best effect of the world, or each robot's best own one.
+fn additions(
+    units: &[&Unit<'_>],
+    whites: &[White<'_, '_>],
+    current: &Fit,
+    scored: &[Scored],
+    tests: usize,
+) -> Vec<Term> {
+    let strong = significant(scored, tests);
+    let shared: Vec<&Scored> =
+        strong.iter().copied().filter(|one| one.candidate.term.whose == Whose::Everyone).collect();
+    let mut groups: BTreeMap<Whose, Vec<&Scored>> = BTreeMap::new();
+    for one in &strong {
+        groups.entry(one.candidate.term.whose).or_default().push(one);
+    }
+    groups.remove(&Whose::Everyone);
+    let best_shared = shared.first().map(|best| best.step.gain);
+    if let Some(gain) = best_shared
+        && groups.values().all(|own| own[0].step.gain < gain)
+    {
+        return choose(units, whites, current, &shared).into_iter().collect();
+    }
+    // A robot waits if what it shows may be its share of an effect of the world.
+    let sharers = units.len().max(1) as f64;
+    let groups: Vec<Vec<&Scored>> = groups
+        .into_values()
+        .filter(|own| best_shared.is_none_or(|gain| own[0].step.gain > 2.0 * gain / sharers))
+        .collect();
+    parallel::map(&groups, |rivals| choose(units, whites, current, rivals)).into_iter().flatten().collect()
+}
+
+/// Fits the strongest rivals and gives the best of them, fitted.
+fn choose(
+    units: &[&Unit<'_>],
+    whites: &[White<'_, '_>],
+    current: &Fit,
+    rivals: &[&Scored],
+) -> Option<Term> {
+    let rivals = &rivals[..rivals.len().min(RIVALS)];
+    let inflation = rivals.iter().map(|rival| rival.step.inflation).fold(f64::INFINITY, f64::min).max(1.0);
+    let fitted: Vec<Option<(f64, Term)>> = parallel::map(rivals, |rival| {
+        let rival = refine(units, whites, rival);
+        let added = fit_beside(units, current, rival.term())?;
+        let term = added.terms.last()?.clone();
+        Some((criterion(units, &added, inflation, term.whose), term))
+    });
+    // Of equals the first: the one whose linearization was the strongest.
+    let mut best: Option<(f64, Term)> = None;
+    for (value, term) in fitted.into_iter().flatten() {
+        if best.as_ref().is_none_or(|(most, _)| value > *most) {
+            best = Some((value, term));
+        }
+    }
+    best.map(|(_, term)| term)
+}
+
+/// Fits a term beside those of a fit; of the units, those that it acts on.
+pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Option<Fit> {
+    let own: Vec<usize> = (0..units.len()).filter(|&unit| term.acts_on(units[unit].robot)).collect();
+    let acting: Vec<&Unit<'_>> = own.iter().map(|&unit| units[unit]).collect();
+    let whose = term.whose;
+    let mut terms: Vec<Term> =
+        current.terms.iter().filter(|known| overlap(known.whose, whose)).cloned().collect();
+    terms.push(term);
+    // What other robots share stays where it is.
+    let movable: Vec<bool> =
+        terms.iter().map(|term| whose == Whose::Everyone || term.whose == whose).collect();
+    fit(&acting, terms, &|index| movable[index], None)
+}
+
+/// Bayes' information criterion on the effective sample size; more is better.
+fn criterion(units: &[&Unit<'_>], fit: &Fit, inflation: f64, whose: Whose) -> f64 {
+    let rows: usize = units
+        .iter()
+        .filter(|unit| overlap(whose, Whose::Robot(unit.robot)))
+        .map(|unit| unit.rows.len())
+        .sum();
+    let effective = (rows as f64 / inflation).max(2.0);
+    2.0 * fit.log_likelihood / inflation - fit.slots.len() as f64 * effective.ln()
+}
+
+/// The robust covariance of all fitted parameters, in the order of the slots.
+pub(crate) fn covariance(units: &[&Unit<'_>], fit: &Fit) -> Option<DMatrix<f64>> {
+    let bare: Vec<White<'_, '_>> =
+        units.iter().zip(&fit.states).map(|(unit, state)| White::new(unit, state, &[])).collect();
+    let bare: Vec<&White<'_, '_>> = bare.iter().collect();
+    let columns: Vec<&[_]> = fit.columns.iter().map(Vec::as_slice).collect();
+    Some(step(&bare, &columns)?.covariance)
+}
+
+/// The Wald statistic of a term and its degrees of freedom.
+pub(crate) fn wald(fit: &Fit, covariance: &DMatrix<f64>, term: usize) -> Option<(f64, usize)> {
+    let own: Vec<usize> = (0..fit.slots.len()).filter(|&slot| fit.slots[slot].0 == term).collect();
+    let parameters = fit.terms[term].parameters();
+    // A term whose size shows in no derivative, such as an onset, cannot be tested this way.
+    let own: Vec<usize> = own.into_iter().filter(|&slot| parameters[fit.slots[slot].1].off.is_finite()).collect();
+    if own.is_empty() {
+        return None;
+    }
+    let part = DMatrix::from_fn(own.len(), own.len(), |i, j| covariance[(own[i], own[j])]);
+    let value = |slot: usize| {
+        let (term, parameter) = fit.slots[slot];
+        fit.terms[term].values[parameter] - parameters[parameter].off
+    };
+    let values = nalgebra::DVector::from_fn(own.len(), |i, _| value(own[i]));
+    Some((values.dot(&part.cholesky()?.solve(&values)), own.len()))
+}
+
+/// Drops terms that are no longer significant beside the others, the weakest first.
+fn prune(units: &[&Unit<'_>], mut current: Fit) -> Option<Fit> {
+    loop {
+        let Some(covariance) = covariance(units, &current) else { return Some(current) };
+        let weakest = (0..current.terms.len())
+            .filter_map(|term| {
+                let (wald, count) = wald(&current, &covariance, term)?;
+                Some((upper_tail(wald, count), term))
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        match weakest {
+            Some((p, term)) if p > PRUNE => {
+                let mut terms = current.terms.clone();
+                terms.remove(term);
+                current = fit(units, terms, &|_| true, None)?;
+            }
+            _ => return Some(current),
+        }
+    }
+}

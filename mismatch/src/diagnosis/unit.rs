@@ -1,0 +1,237 @@
+//! One robot in one recording: its residuals under a model, as one long vector.
+
+use std::ops::Range;
+
+use pleiad_estimation::RobotId;
+use pleiad_estimation::sample::Target;
+use pleiad_physics::{Dual, Floors, RobotModel, Scalar, Variable};
+
+use crate::channel::Channel;
+use crate::compare::residuals_of;
+use crate::diagnosis::term::Term;
+use crate::evidence::Evidence;
+use crate::residual::{Omission, Regime};
+
+/// Scores are summed over blocks of this length: longer than the correlation of what is not modelled,
+/// short enough for many blocks. Seconds.
+pub(crate) const BLOCK_S: f64 = 2.5;
+
+/// A channel's stretch of the vector, rows by rows.
+#[derive(Clone, Debug)]
+pub(crate) struct Stretch {
+    pub(crate) channel: Channel,
+    pub(crate) offset: usize,
+    pub(crate) rows: usize,
+    pub(crate) components: usize,
+    /// The number of the channel's first scale among those of the unit.
+    pub(crate) first_scale: usize,
+    pub(crate) omissions: Vec<Omission>,
+}
+
+impl Stretch {
+    pub(crate) fn range(&self) -> Range<usize> {
+        self.offset..self.offset + self.rows * self.components
+    }
+}
+
+/// What a row of residuals is about.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Row {
+    pub(crate) time_s: f64,
+    pub(crate) regime: Regime,
+    pub(crate) target: Option<Target>,
+    /// Variance that the declared jitter of commands adds; zero for other channels. Declared and not fitted,
+    /// because a fitted one would swallow every lag: it shows in the same rows.
+    pub(crate) agitation: f64,
+}
+
+/// One robot in one recording.
+pub(crate) struct Unit<'a> {
+    pub(crate) evidence: &'a Evidence<'a>,
+    /// The position of the recording among those given.
+    pub(crate) recording: usize,
+    pub(crate) robot: RobotId,
+    pub(crate) nominal: RobotModel<f64>,
+    pub(crate) floors: Floors,
+    pub(crate) stretches: Vec<Stretch>,
+    /// One per element of the vector.
+    pub(crate) rows: Vec<Row>,
+    /// The position of each element's scale: one scale per component of a channel.
+    pub(crate) scale_of: Vec<usize>,
+    /// The name of each scale: channel and component.
+    pub(crate) scales: Vec<(Channel, usize)>,
+    /// The number of each element's block in time.
+    pub(crate) block_of: Vec<usize>,
+    pub(crate) blocks: usize,
+    /// First and last stamp, seconds.
+    pub(crate) span_s: (f64, f64),
+}
+
+/// Residuals of the channels asked for; the others are `None`.
+pub(crate) type Values = Vec<Option<Vec<f64>>>;
+
+/// The derivatives of the residuals with respect to one variable, by stretch; `None` where all are zero.
+#[derive(Clone, Debug)]
+pub(crate) struct Column {
+    pub(crate) parts: Vec<Option<Vec<f64>>>,
+}
+
+impl Column {
+    pub(crate) fn empty(unit: &Unit<'_>) -> Self {
+        Self { parts: vec![None; unit.stretches.len()] }
+    }
+
+    pub(crate) fn is_zero(&self) -> bool {
+        self.parts.iter().all(Option::is_none)
+    }
+}
+
+impl<'a> Unit<'a> {
+    /// Computes the residuals under the nominal model once, which fixes the layout.
+    pub(crate) fn new(
+        evidence: &'a Evidence<'a>,
+        recording: usize,
+        robot: RobotId,
+        nominal: RobotModel<f64>,
+        floors: Floors,
+        jitter_sigma_s: f64,
+    ) -> Self {
+        let mut unit = Self {
+            evidence,
+            recording,
+            robot,
+            nominal,
+            floors,
+            stretches: Vec::new(),
+            rows: Vec::new(),
+            scale_of: Vec::new(),
+            scales: Vec::new(),
+            block_of: Vec::new(),
+            blocks: 0,
+            span_s: (0.0, 0.0),
+        };
+        for channel in Channel::ALL {
+            let found = residuals_of(evidence, robot, &unit.nominal, channel);
+            let components = channel.components().len();
+            let first_scale = unit.scales.len();
+            if !found.rows.is_empty() {
+                unit.scales.extend((0..components).map(|component| (channel, component)));
+            }
+            unit.stretches.push(Stretch {
+                channel,
+                offset: unit.rows.len(),
+                rows: found.rows.len(),
+                components,
+                first_scale,
+                omissions: found.omissions,
+            });
+            for row in &found.rows {
+                for component in 0..components {
+                    unit.rows.push(Row {
+                        time_s: row.time_s,
+                        regime: row.regime,
+                        target: row.target,
+                        agitation: row.du_squared()[component] * jitter_sigma_s * jitter_sigma_s,
+                    });
+                    unit.scale_of.push(first_scale + component);
+                }
+            }
+        }
+        let stamps = || unit.rows.iter().map(|row| row.time_s);
+        let first_s = stamps().fold(f64::INFINITY, f64::min);
+        let last_s = stamps().fold(f64::NEG_INFINITY, f64::max);
+        if first_s <= last_s {
+            unit.span_s = (first_s, last_s);
+            unit.block_of = stamps().map(|time_s| block(time_s - first_s)).collect();
+            unit.blocks = block(last_s - first_s) + 1;
+        }
+        unit
+    }
+
+    pub(crate) fn stretch(&self, channel: Channel) -> Option<&Stretch> {
+        self.stretches.iter().find(|stretch| stretch.channel == channel && stretch.rows > 0)
+    }
+
+    /// The nominal model with the terms that act on this robot.
+    pub(crate) fn model<'t>(&self, terms: impl IntoIterator<Item = &'t Term>) -> RobotModel<f64> {
+        let mut model = self.nominal.clone();
+        for term in terms {
+            if term.acts_on(self.robot) {
+                model.effects.push(term.active());
+            }
+        }
+        model
+    }
+
+    /// Residuals under a model; `None` for a channel in which a prediction is no finite number where the
+    /// nominal one is.
+    pub(crate) fn values(&self, model: &RobotModel<f64>, channels: &dyn Fn(Channel) -> bool) -> Values {
+        let stretch = |stretch: &Stretch| {
+            (stretch.rows > 0 && channels(stretch.channel)).then(|| self.evaluated(model, stretch)).flatten()
+        };
+        self.stretches.iter().map(stretch).collect()
+    }
+
+    fn evaluated<S: Scalar>(&self, model: &RobotModel<S>, stretch: &Stretch) -> Option<Vec<S>> {
+        let found = residuals_of(self.evidence, self.robot, model, stretch.channel);
+        let values: Vec<S> = found.rows.iter().flat_map(|row| row.values().iter().copied()).collect();
+        (found.rows.len() == stretch.rows && values.len() == stretch.rows * stretch.components)
+            .then_some(values)
+    }
+
+    /// Derivatives of the residuals with respect to variables of a model.
+    pub(crate) fn columns(
+        &self,
+        model: &RobotModel<f64>,
+        variables: &[Variable],
+        channels: &dyn Fn(Channel) -> bool,
+    ) -> Vec<Column> {
+        let mut columns = Vec::with_capacity(variables.len());
+        let mut rest = variables;
+        while !rest.is_empty() {
+            let length = match rest.len() {
+                1 => 1,
+                2 | 3 => 2,
+                _ => 4,
+            };
+            let (now, later) = rest.split_at(length);
+            rest = later;
+            match *now {
+                [a] => columns.extend(self.batch(model, &[a], channels)),
+                [a, b] => columns.extend(self.batch(model, &[a, b], channels)),
+                [a, b, c, d] => columns.extend(self.batch(model, &[a, b, c, d], channels)),
+                _ => {}
+            }
+        }
+        columns
+    }
+
+    fn batch<const P: usize>(
+        &self,
+        model: &RobotModel<f64>,
+        variables: &[Variable; P],
+        channels: &dyn Fn(Channel) -> bool,
+    ) -> Vec<Column> {
+        let model: RobotModel<Dual<P>> = model.differentiated(variables);
+        let mut columns = vec![Column { parts: Vec::with_capacity(self.stretches.len()) }; P];
+        for stretch in &self.stretches {
+            let wanted = stretch.rows > 0 && channels(stretch.channel);
+            let values = if wanted { self.evaluated(&model, stretch) } else { None };
+            for (index, column) in columns.iter_mut().enumerate() {
+                let derivative = |value: &Dual<P>| value.derivatives()[index];
+                let part = values.as_ref().map(|values| values.iter().map(derivative).collect::<Vec<f64>>());
+                let part = part.filter(|part| {
+                    part.iter().all(|value| value.is_finite()) && part.iter().any(|value| *value != 0.0)
+                });
+                column.parts.push(part);
+            }
+        }
+        columns
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "times since the first, at least 0")]
+fn block(since_s: f64) -> usize {
+    (since_s / BLOCK_S) as usize
+}
+

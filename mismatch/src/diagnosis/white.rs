@@ -1,0 +1,208 @@
+//! Residuals and derivatives divided by the noise, summed in blocks of time.
+//!
+//! Errors are correlated in time: what one block says counts once. Variances of scores are those of their
+//! block sums (a cluster-robust sandwich, `liang1986`), never below half of what independent errors would
+//! give.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use crate::diagnosis::fit::State;
+use crate::diagnosis::noise;
+use crate::diagnosis::unit::{Column, Stretch, Unit};
+
+/// The least variance of a score, as a share of that of independent errors.
+const LEAST_SHARE: f64 = 0.5;
+
+/// A unit with its residuals in sigmas and the columns of a model, all in sigmas.
+pub(crate) struct White<'u, 'a> {
+    pub(crate) unit: &'u Unit<'a>,
+    /// Residuals in sigmas, times the root of their weight.
+    pub(crate) errors: Vec<f64>,
+    /// What residuals and columns are multiplied by: the root of the weight over sigma. Both alike, so that an
+    /// effect far above the noise is seen at its size; what it does not explain pulls no more than it may.
+    factors: Vec<f64>,
+    /// What the model's parameters predict, per parameter: minus the derivative of the residual.
+    active: Vec<Vec<Option<Vec<f64>>>>,
+}
+
+impl<'u, 'a> White<'u, 'a> {
+    pub(crate) fn new(unit: &'u Unit<'a>, state: &State, columns: &[Column]) -> Self {
+        let factor =
+            |(residual, sigma): (&f64, &f64)| noise::weight(residual / sigma).sqrt() / sigma;
+        let factors: Vec<f64> = state.residuals.iter().zip(&state.noise.sigma).map(factor).collect();
+        let errors = state.residuals.iter().zip(&factors).map(|(residual, factor)| residual * factor).collect();
+        let mut white = Self { unit, errors, factors, active: Vec::new() };
+        white.active = columns.iter().map(|column| white.of(column)).collect();
+        white
+    }
+
+    /// A column in sigmas, per stretch.
+    fn of(&self, column: &Column) -> Vec<Option<Vec<f64>>> {
+        let part = |(part, stretch): (&Option<Vec<f64>>, &Stretch)| {
+            let factors = &self.factors[stretch.range()];
+            part.as_ref().map(|part| part.iter().zip(factors).map(|(value, factor)| -value * factor).collect())
+        };
+        column.parts.iter().zip(&self.unit.stretches).map(part).collect()
+    }
+}
+
+/// A hypothesis of one step beyond a fit.
+#[derive(Clone, Debug)]
+pub(crate) struct Step {
+    /// The parameters, from the start.
+    pub(crate) change: DVector<f64>,
+    /// Twice the log-likelihood gained if errors were independent.
+    pub(crate) gain: f64,
+    /// The Wald statistic with the robust covariance, to be compared with chi-square of as many degrees as
+    /// there are parameters.
+    pub(crate) wald: f64,
+    /// Mean of robust over independent variance.
+    pub(crate) inflation: f64,
+    /// The robust covariance of the parameters.
+    pub(crate) covariance: DMatrix<f64>,
+}
+
+/// The best step in `columns` (one list per white unit) beside the active parameters, which follow it.
+/// `None` if the columns say nothing that the active parameters do not.
+pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<Step> {
+    let size = columns.first()?.len();
+    let active = whites.first()?.active.len();
+    let own: Vec<Vec<Vec<Option<Vec<f64>>>>> = whites
+        .iter()
+        .zip(columns)
+        .map(|(white, columns)| columns.iter().map(|column| white.of(column)).collect())
+        .collect();
+    // Gram matrices over the stretches that the columns show in.
+    let mut both = DMatrix::zeros(size, active);
+    let mut within = DMatrix::zeros(size, size);
+    let mut among = DMatrix::zeros(active, active);
+    let mut right = DVector::zeros(size);
+    let mut right_active = DVector::zeros(active);
+    for (white, own) in whites.iter().zip(&own) {
+        for (which, stretch) in white.unit.stretches.iter().enumerate() {
+            let errors = &white.errors[stretch.range()];
+            for (i, a) in own.iter().enumerate() {
+                let Some(a) = &a[which] else { continue };
+                right[i] += dot(a, errors);
+                for (j, b) in own.iter().enumerate().take(i + 1) {
+                    let Some(b) = &b[which] else { continue };
+                    within[(i, j)] += dot(a, b);
+                }
+                for (j, b) in white.active.iter().enumerate() {
+                    let Some(b) = &b[which] else { continue };
+                    both[(i, j)] += dot(a, b);
+                }
+            }
+            for (i, a) in white.active.iter().enumerate() {
+                let Some(a) = &a[which] else { continue };
+                right_active[i] += dot(a, errors);
+                for (j, b) in white.active.iter().enumerate().take(i + 1) {
+                    let Some(b) = &b[which] else { continue };
+                    among[(i, j)] += dot(a, b);
+                }
+            }
+        }
+    }
+    symmetric(&mut within);
+    symmetric(&mut among);
+    // Parameters that do not show here get a unit diagonal and stay out of it.
+    for slot in 0..active {
+        if among[(slot, slot)] == 0.0 {
+            among[(slot, slot)] = 1.0;
+        }
+    }
+    let full = DVector::from_fn(size, |i, _| within[(i, i)]);
+    let project = if active == 0 { None } else { Some(ridge(among)?) };
+    let (coefficients, information, score) = match &project {
+        None => (DMatrix::zeros(active, size), within, right),
+        Some(factor) => {
+            let coefficients = factor.solve(&both.transpose());
+            let information = &within - &both * &coefficients;
+            let score = &right - coefficients.transpose() * &right_active;
+            (coefficients, information, score)
+        }
+    };
+    // What is left of a column beside the active ones must be more than rounding.
+    if (0..size).any(|i| information[(i, i)].partial_cmp(&(1e-6 * full[i])) != Some(std::cmp::Ordering::Greater)) {
+        return None;
+    }
+    let scale = DVector::from_fn(size, |i, _| 1.0 / information[(i, i)].sqrt());
+    let scaled = DMatrix::from_fn(size, size, |i, j| information[(i, j)] * scale[i] * scale[j]);
+    let eigen = SymmetricEigen::new(scaled.clone());
+    if eigen.eigenvalues.iter().any(|value| *value < 1e-7) {
+        return None;
+    }
+    let inverse = information.clone().cholesky()?.inverse();
+    let change = &inverse * &score;
+    // Block sums of the scores after the step.
+    let mut meat: DMatrix<f64> = DMatrix::zeros(size, size);
+    for (white, own) in whites.iter().zip(&own) {
+        let mut sums: DMatrix<f64> = DMatrix::zeros(size, white.unit.blocks);
+        for (which, stretch) in white.unit.stretches.iter().enumerate() {
+            let range = stretch.range();
+            let shown: Vec<(usize, &[f64])> =
+                own.iter().enumerate().filter_map(|(i, a)| Some((i, a[which].as_deref()?))).collect();
+            let active: Vec<(usize, &[f64])> =
+                white.active.iter().enumerate().filter_map(|(j, b)| Some((j, b[which].as_deref()?))).collect();
+            if shown.is_empty() && active.is_empty() {
+                continue;
+            }
+            let mut left = vec![0.0; size];
+            for row in 0..range.len() {
+                left.fill(0.0);
+                for (i, a) in &shown {
+                    left[*i] = a[row];
+                }
+                for (j, b) in &active {
+                    for (i, value) in left.iter_mut().enumerate() {
+                        *value -= b[row] * coefficients[(*j, i)];
+                    }
+                }
+                let fitted: f64 = left.iter().zip(change.iter()).map(|(a, b)| a * b).sum();
+                let error = white.errors[range.start + row] - fitted;
+                let block = white.unit.block_of[range.start + row];
+                for (i, value) in left.iter().enumerate() {
+                    sums[(i, block)] += value * error;
+                }
+            }
+        }
+        meat += &sums * sums.transpose();
+    }
+    let (meat, inflation) = floored(&meat, &information)?;
+    let covariance = &inverse * meat * &inverse;
+    let wald = change.dot(&(covariance.clone().cholesky()?.solve(&change)));
+    let gain = change.dot(&score);
+    Some(Step { change, gain, wald, inflation, covariance })
+}
+
+/// The meat of a sandwich, at least [`LEAST_SHARE`] of `bread` in every direction, and their mean ratio.
+pub(crate) fn floored(meat: &DMatrix<f64>, bread: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
+    let size = bread.nrows();
+    let factor = bread.clone().cholesky()?.l();
+    let inverse = factor.clone().try_inverse()?;
+    let whitened = &inverse * meat * inverse.transpose();
+    let eigen = SymmetricEigen::new(0.5 * (&whitened + whitened.transpose()));
+    let raised = eigen.eigenvalues.map(|value| value.max(LEAST_SHARE));
+    let inflation = raised.sum() / size as f64;
+    let vectors = &factor * &eigen.eigenvectors;
+    Some((&vectors * DMatrix::from_diagonal(&raised) * vectors.transpose(), inflation))
+}
+
+fn ridge(mut matrix: DMatrix<f64>) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
+    for slot in 0..matrix.nrows() {
+        matrix[(slot, slot)] *= 1.0 + 1e-10;
+    }
+    matrix.cholesky()
+}
+
+fn symmetric(matrix: &mut DMatrix<f64>) {
+    for row in 0..matrix.nrows() {
+        for column in row + 1..matrix.ncols() {
+            matrix[(row, column)] = matrix[(column, row)];
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,71 @@
+//! How far a prediction is off after a while.
+
+use pleiad_estimation::RobotId;
+use pleiad_physics::chain::body::BodyState;
+use pleiad_physics::{Pose, RobotModel, Scalar};
+
+use crate::commanded::Driver;
+use crate::evidence::Evidence;
+use crate::{body, commanded};
+
+/// The horizons over which predictions are usually judged, seconds.
+pub const HORIZONS_S: [f64; 6] = [0.5, 1.0, 2.0, 5.0, 10.0, 30.0];
+
+/// A prediction from a true pose to a later one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rollout {
+    /// Its beginning, seconds since the origin of the evidence.
+    pub time_s: f64,
+    /// Distance between the true and the predicted position at its end, metres.
+    pub position_error_m: f64,
+    /// True minus predicted heading at its end, wrapped, radians.
+    pub heading_error_rad: f64,
+}
+
+/// Predictions over every horizon, in the order of the horizons: from true poses by the encoders alone, or
+/// without encoders by the commands, with the servo as it stands. Those of one horizon do not overlap.
+///
+/// Where truth, odometry or commands have a gap there is none; a horizon that is not above 0 has none.
+pub fn rollouts(
+    evidence: &Evidence<'_>,
+    robot: RobotId,
+    model: &RobotModel<f64>,
+    horizons_s: &[f64],
+) -> Vec<Vec<Rollout>> {
+    let over = |&horizon_s: &f64| {
+        if horizon_s > 0.0 { over_horizon(evidence, robot, model, horizon_s) } else { Vec::new() }
+    };
+    horizons_s.iter().map(over).collect()
+}
+
+fn over_horizon(
+    evidence: &Evidence<'_>,
+    robot: RobotId,
+    model: &RobotModel<f64>,
+    horizon_s: f64,
+) -> Vec<Rollout> {
+    let Some((_, track)) = evidence.robot(robot) else { return Vec::new() };
+    if track.encoders.is_empty() {
+        let plan = commanded::plan(evidence, robot, horizon_s);
+        let mut driver = Driver::new(track, model);
+        let one = |own: &commanded::Motion| {
+            end_error(own.window.from_s, &own.measured, &driver.predicted(model, own))
+        };
+        return plan.items.iter().map(one).collect();
+    }
+    let plan = body::plan_of_length(evidence, robot, horizon_s);
+    let mut state = BodyState::default();
+    let one = |own: &body::Motion| {
+        let from_s = track.encoders[own.window.first].time_s;
+        end_error(from_s, &own.measured, &own.predicted(track, model, &mut state))
+    };
+    plan.items.iter().map(one).collect()
+}
+
+fn end_error(time_s: f64, measured: &Pose<f64>, predicted: &Pose<f64>) -> Rollout {
+    Rollout {
+        time_s,
+        position_error_m: (measured.x_m - predicted.x_m).hypot(measured.y_m - predicted.y_m),
+        heading_error_rad: (measured.yaw_rad - predicted.yaw_rad).wrapped(),
+    }
+}

@@ -1,0 +1,61 @@
+//! The findings in a few lines, for a terminal.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use pleiad_mismatch::{Finding, Findings, Verdict};
+use pleiad_report::quantity;
+
+use super::sentences::{claim_words, robots, title};
+
+/// Untestable effects are counted beyond this many reasons.
+const REASONS: usize = 4;
+
+pub(super) fn text(findings: &Findings, out: &Path) -> String {
+    let mut text = format!("{}: {}\n", findings.recordings.join(", "), claim_words(findings.verdict));
+    for (index, finding) in findings.findings.iter().enumerate() {
+        let _ = writeln!(text, "\n{}. {}", index + 1, lines(finding));
+    }
+    text.push('\n');
+    for own in &findings.roll_outs {
+        let [before, after] = own.error_per_100_m;
+        if before.is_finite() && after.is_finite() {
+            let (before, after) = (quantity(before, "m"), quantity(after, "m"));
+            let _ = writeln!(text, "robot {}: error per 100 m {before} before, {after} after", own.robot);
+        }
+    }
+    let mut reasons: Vec<&str> = findings.untestable.iter().map(|own| own.why.as_str()).collect();
+    reasons.sort_unstable();
+    reasons.dedup();
+    for why in reasons.iter().take(REASONS) {
+        let count = findings.untestable.iter().filter(|own| own.why == *why).count();
+        let _ = writeln!(text, "not tested ({count}): {why}");
+    }
+    if reasons.len() > REASONS {
+        let _ = writeln!(text, "not tested: {} more reasons in the report", reasons.len() - REASONS);
+    }
+    for note in &findings.notes {
+        let _ = writeln!(text, "note: {note}");
+    }
+    let _ = writeln!(text, "corrected model: {}/corrected.toml", out.display());
+    let _ = writeln!(text, "report: {}/report.html", out.display());
+    text
+}
+
+fn lines(finding: &Finding) -> String {
+    let mut text =
+        format!("{} ({}): {}", robots(&finding.robots), finding.stage, claim_words(finding.verdict));
+    if finding.verdict == Verdict::CannotTell {
+        let names: Vec<&str> = finding.support_set.iter().map(|name| title(name)).collect();
+        let _ = write!(text, ": {}", names.join(" / "));
+    }
+    let _ = write!(text, "\n   {}", finding.summary);
+    let held_out = &finding.held_out;
+    let (gain, error) = (quantity(held_out.log_score_gain, ""), quantity(held_out.log_score_gain_se, ""));
+    let _ =
+        write!(text, "\n   p {}; held-out log score {gain} ± {error}", quantity(finding.p_familywise, ""));
+    if let Some(manoeuvre) = &finding.manoeuvre {
+        let _ = write!(text, "\n   drive next: {manoeuvre}");
+    }
+    text
+}
