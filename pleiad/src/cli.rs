@@ -24,7 +24,7 @@ pub enum Command {
     Replay(ReplayArgs),
     /// What a scenario or a recording lets the team know of itself.
     Observability(ObservabilityArgs),
-    /// What the nominal model predicts of a recording, and what was measured instead.
+    /// A recording of a scenario; or what the nominal model predicts of one, and what was measured instead.
     Simulate(SimulateArgs),
     /// What physics the nominal model leaves out: where, what, how sure, and the corrected model.
     Diagnose(DiagnoseArgs),
@@ -161,13 +161,19 @@ pub struct ObservabilityArgs {
 
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
-    /// The recording, a folder with nominal.toml in it.
+    /// The scenario to record; docs/scenario.md lists its keys.
+    #[arg(required_unless_present = "from", conflicts_with = "from")]
+    pub scenario: Option<PathBuf>,
+    /// Seed of the scenario; its own if absent.
+    #[arg(long, conflicts_with = "from")]
+    pub seed: Option<u64>,
+    /// The recording to predict, a folder with nominal.toml in it.
     #[arg(long, value_name = "RECORDING")]
-    pub from: PathBuf,
+    pub from: Option<PathBuf>,
     /// Another model of the robots, such as a corrected.toml, in place of the recording's nominal.toml.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "scenario")]
     pub model: Option<PathBuf>,
-    /// Folder for the residuals; a new one under runs/ if absent.
+    /// Folder for the recording, or for the residuals; a new one under runs/ if absent.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// One JSON object on stdout.

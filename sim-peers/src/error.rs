@@ -50,6 +50,18 @@ pub enum Error {
         /// What would be accepted.
         expected: String,
     },
+    /// An effect that the catalogue does not have, or not so.
+    #[error("{place}: `{key}`: found {found}, expected {expected}")]
+    Effect {
+        /// Where.
+        place: String,
+        /// The key, with the tables it is in.
+        key: String,
+        /// What was found.
+        found: String,
+        /// What would be accepted.
+        expected: String,
+    },
     /// Automatic placement found no free place.
     #[error(
         "no start for robot {robot} at {separation_m} m from the other robots in {attempts} attempts; \

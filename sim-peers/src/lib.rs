@@ -12,11 +12,13 @@ pub mod agents;
 pub mod error;
 pub mod feed;
 pub mod fleet;
+mod injected;
 pub mod scenario;
 pub mod world;
 
 pub use error::Error;
 pub use feed::{FeedOptions, FeedReport, feed};
 pub use fleet::{Fleet, FleetOptions, MemberOutcome};
+pub use injected::injected_text;
 pub use scenario::Scenario;
 pub use world::{Prior, SimulatedRun, connectivity, simulate};

@@ -1,9 +1,12 @@
-//! `pleiad simulate`: what the nominal model predicts of a recording, and what was measured instead.
+//! `pleiad simulate`: a recording of a scenario ([`record`]), or what the nominal model predicts of a
+//! recording, and what was measured instead.
+
+mod record;
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use pleiad_estimation::sample::Target;
 use pleiad_mismatch::{ChannelComparison, ChannelResiduals, RobotComparison, compare};
 use pleiad_recording::ReadOptions;
@@ -48,7 +51,16 @@ struct ComponentJson {
 }
 
 pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
-    let recording_folder = setup::recording_folder(&args.from);
+    match (&args.scenario, &args.from) {
+        (Some(scenario), _) => record::run(scenario, args),
+        (None, Some(from)) => predict(from, args),
+        // clap asks for one of them.
+        (None, None) => bail!("name a scenario, or a recording with --from"),
+    }
+}
+
+fn predict(from: &Path, args: &SimulateArgs) -> anyhow::Result<()> {
+    let recording_folder = setup::recording_folder(from);
     let (mut recording, _) = pleiad_recording::open(&recording_folder, &ReadOptions::default())?;
     if let Some(path) = &args.model {
         let mut warnings = Vec::new();
@@ -60,7 +72,7 @@ pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     let robots = compare(&recording)?;
     let folder = folder::create(args.out.as_deref(), "simulate")?;
     let json = SimulateJson {
-        recording: args.from.display().to_string(),
+        recording: from.display().to_string(),
         model: args.model.as_ref().map(|path| path.display().to_string()),
         folder: folder.display().to_string(),
         robots: robots.iter().map(|robot| write_robot(&folder, robot)).collect::<Result<_, _>>()?,

@@ -22,6 +22,16 @@ macro_rules! declared {
                     .filter_map(|(key, value)| value.map(|value| (key, value)))
             }
 
+            /// Every key that is declared, with its value and that of `truth`.
+            pub fn compared(
+                &self,
+                truth: &NominalRobot,
+            ) -> impl Iterator<Item = (&'static str, f64, f64)> + use<> {
+                [$((stringify!($key), self.$key, truth.$key)),*]
+                    .into_iter()
+                    .filter_map(|(key, declared, truth)| declared.map(|declared| (key, declared, truth)))
+            }
+
             /// One in which every key has a value.
             pub(super) fn example() -> Self {
                 Self { $($key: Some(0.0)),* }

@@ -194,7 +194,9 @@ impl Loader<'_> {
             let path = format!("{path}.{EFFECTS}[{index}]");
             let spec: EffectSpec = value.clone().try_into().map_err(|error| self.syntax(&path, &error))?;
             let declared = spec.declared().map_err(|wrong| {
-                self.error(&format!("{path}.{}", wrong.key), &wrong.found, &wrong.expected)
+                let key = format!("{path}.{}", wrong.key);
+                let place = keys::place(self.file, self.lines.find(&key));
+                Error::Effect { place, key, found: wrong.found, expected: wrong.expected }
             })?;
             Ok(declared.active)
         };

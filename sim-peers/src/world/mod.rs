@@ -29,6 +29,7 @@ use pleiad_physics::ActiveEffect;
 use pleiad_recording::{Recording, RobotRecording};
 
 pub use connectivity::{Disconnection, connectivity};
+pub(crate) use nominal::true_nominal;
 pub use track::Track;
 
 use crate::{Error, Scenario};

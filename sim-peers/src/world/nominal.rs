@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use pleiad_recording::{Nominal, NominalNoise, NominalRangeSensor, NominalRobot};
 
 use crate::Scenario;
-use crate::scenario::{OdometryKind, RobotSettings};
+use crate::scenario::{OdometryKind, RelativeSensor, RobotSettings};
 
 /// The nominal of a scenario. Noises and the range sensor are stated once for the team: where robots
 /// differ, the largest noise and the widest sensor among those that have the channel.
@@ -28,21 +28,28 @@ pub(super) fn nominal(scenario: &Scenario) -> Nominal {
         odometry_floor_heading_sigma_rad_per_1s: greatest(|_| 1.0, |robot| one_second(robot)[2]),
         ..NominalNoise::default()
     };
+    // Where nobody has one, some sensor is declared all the same: the format knows no absence.
+    let absent = RelativeSensor::default();
+    let mut sensors: Vec<&RelativeSensor> =
+        scenario.robots.values().filter(|robot| seeing(robot) > 0.0).map(|robot| &robot.relative).collect();
+    if sensors.is_empty() {
+        sensors.push(&absent);
+    }
+    let widest = |value: fn(&RelativeSensor) -> f64| sensors.iter().map(|own| value(own)).fold(0.0, f64::max);
     let range_sensor = NominalRangeSensor {
-        max_range_m: greatest(seeing, |robot| robot.relative.max_range_m),
-        min_range_m: scenario
-            .robots
-            .values()
-            .filter(|robot| seeing(robot) > 0.0)
-            .map(|robot| robot.relative.min_range_m)
-            .reduce(f64::min)
-            .unwrap_or(0.0),
-        half_fov_rad: greatest(seeing, |robot| robot.relative.half_fov_rad),
-        detection_probability: greatest(seeing, |robot| 1.0 - robot.relative.drop_out),
+        max_range_m: widest(|sensor| sensor.max_range_m),
+        min_range_m: sensors.iter().map(|sensor| sensor.min_range_m).fold(f64::INFINITY, f64::min),
+        half_fov_rad: widest(|sensor| sensor.half_fov_rad),
+        detection_probability: widest(|sensor| 1.0 - sensor.drop_out),
         range_scale: 1.0,
         ..NominalRangeSensor::default()
     };
-    let robots = scenario.robots.iter().map(|(robot, settings)| (*robot, nominal_robot(settings))).collect();
+    let declared = |settings: &RobotSettings| {
+        let mut nominal = true_nominal(settings);
+        settings.declared.apply(&mut nominal);
+        nominal
+    };
+    let robots = scenario.robots.iter().map(|(robot, settings)| (*robot, declared(settings))).collect();
     Nominal { noise, range_sensor, robots }
 }
 
@@ -52,7 +59,8 @@ fn one_second(robot: &RobotSettings) -> [f64; 3] {
     robot.odometry.noise.variance(motion.speed_m_s, motion.max_yaw_rate_rad_s, 1.0).map(f64::sqrt)
 }
 
-fn nominal_robot(robot: &RobotSettings) -> NominalRobot {
+/// What would be declared of a robot if nothing were mis-tuned.
+pub(crate) fn true_nominal(robot: &RobotSettings) -> NominalRobot {
     let odometry = match robot.odometry.kind {
         OdometryKind::Wheels => "wheel_odometry_rate_hz",
         OdometryKind::Velocity | OdometryKind::Increment => "odometry_rate_hz",
@@ -68,7 +76,7 @@ fn nominal_robot(robot: &RobotSettings) -> NominalRobot {
         ]
         .map(|(key, rate_hz)| (key.to_owned(), rate_hz)),
     );
-    let mut nominal = NominalRobot {
+    NominalRobot {
         wheel_radius: robot.wheel_radius_m,
         track_width: robot.track_width_m,
         encoder_ticks_per_rev: f64::from(robot.encoder_ticks_per_rev),
@@ -81,7 +89,5 @@ fn nominal_robot(robot: &RobotSettings) -> NominalRobot {
         rates_hz,
         drive: robot.drive.drive(),
         ..NominalRobot::default()
-    };
-    robot.declared.apply(&mut nominal);
-    nominal
+    }
 }
