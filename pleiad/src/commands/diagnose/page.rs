@@ -198,18 +198,19 @@ fn evidence(own: &pleiad_mismatch::PartialResidual) -> Evidence {
     }
 }
 
-/// A channel for people.
+/// A channel for people; one that has no words yet goes by its name.
 fn words(channel: Channel) -> &'static str {
-    match channel {
-        Channel::Actuator => "wheels against commands",
-        Channel::Body => "motion against wheels",
-        Channel::Gyro => "gyro",
-        Channel::Gps => "GPS",
-        Channel::Heading => "absolute heading",
-        Channel::RangeToLandmark => "range to landmarks",
-        Channel::BearingToLandmark => "bearing of landmarks",
-        Channel::RangeToRobot => "range to robots",
-        Channel::BearingToRobot => "bearing of robots",
+    match channel.name() {
+        "actuator" => "wheels against commands",
+        "body" => "motion against wheels",
+        "commanded_body" => "motion against commands",
+        "gps" => "GPS",
+        "heading" => "absolute heading",
+        "range_to_landmark" => "range to landmarks",
+        "bearing_to_landmark" => "bearing of landmarks",
+        "range_to_robot" => "range to robots",
+        "bearing_to_robot" => "bearing of robots",
+        name => name,
     }
 }
 
