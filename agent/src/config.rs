@@ -1,6 +1,7 @@
 //! Configuration of an agent: what `pleiad agent --config FILE` reads. `docs/agent.md` lists every key.
 
 mod checks;
+mod model;
 mod sections;
 
 use std::collections::BTreeMap;
@@ -11,13 +12,15 @@ use pleiad_estimation::fold::FoldConfig;
 use pleiad_estimation::motion::MotionModel;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use pleiad_protocol::TeamName;
+use pleiad_recording::RecordingError;
 use serde::{Deserialize, Serialize};
 
 use checks::{finite, not_negative, positive, value};
+pub use model::RobotCorrection;
 pub use sections::{
     AngleNoise, BusMode, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LengthNoise,
     MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection, Strategy,
-    YawName,
+    VelocityName, YawName,
 };
 
 /// Why a configuration cannot be used.
@@ -48,6 +51,17 @@ pub enum ConfigError {
         /// What is wrong in it.
         cause: Box<ConfigError>,
     },
+    /// The model of the robot cannot be read.
+    #[error("model: {0}")]
+    Model(Box<RecordingError>),
+    /// The model is not of this robot.
+    #[error("model = \"{}\": found no section [robots.r{robot}]; add it, or name the model of this team", path.display())]
+    NotInModel {
+        /// The model file.
+        path: PathBuf,
+        /// The robot.
+        robot: u32,
+    },
     /// A value out of its range.
     #[error("{key} = {found}: expected {expected}")]
     Value {
@@ -71,6 +85,10 @@ pub struct AgentConfig {
     /// How observations of other robots are used.
     #[serde(default)]
     pub strategy: Strategy,
+    /// A model of the team's robots, such as a `corrected.toml`; what it says beyond `[motion]` and
+    /// `[sensors]` is taken out of every reading. Relative to the file it is read from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<PathBuf>,
     /// What decides the bits of the estimate; the same for all robots of a team.
     #[serde(default)]
     pub filter: FilterSection,
@@ -120,6 +138,8 @@ pub struct NodeConfig {
     pub prior: Option<Prior>,
     /// Dead reckoning.
     pub motion: MotionModel,
+    /// What is taken out of readings before they are used; nothing if absent.
+    pub correction: Option<RobotCorrection>,
     /// A longer silence of the odometry is a new boot.
     pub longest_gap_s: f64,
     /// Fastest possible motion: m/s, m/s, rad/s.
@@ -144,8 +164,11 @@ impl AgentConfig {
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let text = std::fs::read_to_string(path)
             .map_err(|cause| ConfigError::Read { path: path.to_owned(), cause })?;
-        let config: Self = toml::from_str(&text)
+        let mut config: Self = toml::from_str(&text)
             .map_err(|cause| ConfigError::Parse { path: path.to_owned(), cause: Box::new(cause) })?;
+        if let (Some(model), Some(folder)) = (&mut config.model, path.parent()) {
+            *model = folder.join(&*model);
+        }
         match config.node() {
             Ok(_) => Ok(config),
             Err(cause) => Err(ConfigError::In { path: path.to_owned(), cause: Box::new(cause) }),
@@ -164,10 +187,11 @@ impl AgentConfig {
         })
     }
 
-    /// The checked part that the node needs.
+    /// The checked part that the node needs. Reads the model, if there is one.
     ///
     /// # Errors
-    /// [`ConfigError::Value`] for the first value out of range.
+    /// [`ConfigError::Value`] for the first value out of range; [`ConfigError::Model`] and
+    /// [`ConfigError::NotInModel`] for a model that cannot be used.
     pub fn node(&self) -> Result<NodeConfig, ConfigError> {
         self.team()?;
         let motion = &self.motion;
@@ -184,16 +208,25 @@ impl AgentConfig {
         positive("bus.status_period_s", self.bus.status_period_s)?;
         not_negative("output.fsync_period_s", self.output.fsync_period_s)?;
         self.sensors.check()?;
+        let correction = self.correction(&mut Vec::new())?;
+        let mut sensors = self.sensors.clone();
+        let mut model = motion.checked()?;
+        if correction.is_some() {
+            // The model has its own biases, and takes them out.
+            sensors.range_bias_m = 0.0;
+            model.gyro_bias_rad_s = 0.0;
+        }
         Ok(NodeConfig {
             robot: RobotId(self.robot),
             strategy: self.strategy,
             fold: self.filter.fold(),
             prior: self.prior.as_ref().map(PriorSection::checked).transpose()?,
-            motion: motion.checked()?,
+            motion: model,
+            correction,
             longest_gap_s: motion.longest_gap_s,
             motion_limits: [motion.speed_limit_m_s, motion.speed_limit_m_s, motion.yaw_rate_limit_rad_s],
             history_samples: motion.history_samples,
-            sensors: self.sensors.clone(),
+            sensors,
             clock: self.clock.checked()?,
             landmarks: self.map()?,
             estimate_rate_hz: self.output.estimate_rate_hz,

@@ -2,7 +2,9 @@
 //! clock, no file, no network.
 
 mod commands;
+mod corrector;
 mod intake;
+mod reckoning;
 mod recovery;
 mod segments;
 mod views;
@@ -13,6 +15,7 @@ pub use commands::{Command, Event, Notice, Record};
 pub use intake::SampleRefusal;
 pub use views::SettledEstimate;
 
+use corrector::Corrector;
 use pleiad_estimation::fact::{
     Absolute, Answer, Body, Boot, Continuation, Entry, EntryId, Half, LogId, NoiseRef, Observation, Profile,
     Quantity, VoidReason,
@@ -39,6 +42,8 @@ pub struct Node {
     config: NodeConfig,
     ledger: Ledger,
     dead_reckoning: DeadReckoning,
+    /// Takes out of readings what a model knows of them; absent without a model.
+    corrector: Option<Corrector>,
     /// Nominal trajectories of this robot's boots, the last one current once `booted`.
     segments: Segments,
     /// Random for this start of the process; each boot's nonce derives from it.
@@ -72,6 +77,10 @@ impl Node {
         Self {
             ledger: Ledger::new(config.fold),
             dead_reckoning: DeadReckoning::new(config.motion),
+            corrector: config
+                .correction
+                .as_ref()
+                .map(|correction| Corrector::new(config.robot, correction, config.fold)),
             config,
             segments: Segments::default(),
             nonce,
@@ -257,8 +266,16 @@ impl Node {
         let entry = Entry { id, body, extension: Vec::new() };
         // The own log has no gap and no second author: this always extends it.
         self.ledger.insert(entry.clone());
+        self.hear(&entry);
         self.out.records.push(Record::Entry(entry.clone()));
         self.out.entries.push(entry);
+    }
+
+    /// The corrector learns what this robot says.
+    fn hear(&mut self, entry: &Entry) {
+        if let Some(corrector) = &mut self.corrector {
+            corrector.hear(entry);
+        }
     }
 
     /// A boot begins at `time`: at the first odometry of this start, and after every gap of the odometry.
@@ -309,6 +326,7 @@ impl Node {
             Outside::Forgotten => SampleRefusal::TooOld { time: sample.time },
             Outside::After => SampleRefusal::AfterLastOdometry { time: sample.time },
         })?;
+        let sample = &self.as_nominal(sample, (boot, &observer.nominal))?;
         let (quantity, profile) = self.quantity(sample)?;
         if self.config.sensors.profiles()[usize::from(profile)].is_none() {
             return Err(SampleRefusal::NoNoise { kind: SensorsSection::profile_name(profile) });

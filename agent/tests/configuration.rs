@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use pleiad_agent::config::{BusMode, ErrorName, Strategy, YawName};
+use pleiad_agent::config::{BusMode, ErrorName, Strategy, VelocityName, YawName};
 use pleiad_agent::{AgentConfig, ConfigError};
 use pleiad_estimation::motion::DifferentialDrive;
 use toml::{Table, Value};
@@ -36,6 +36,7 @@ fn read(text: &str) -> Result<AgentConfig, ConfigError> {
 /// A configuration with every key there is.
 fn full() -> Table {
     let text = "
+        model = 'corrected.toml'
         [prior]
         x_m = 0.0
         y_m = 0.0
@@ -184,6 +185,7 @@ fn documented_names_are_the_names() {
     check("strategy", &[Strategy::Exact, Strategy::Independent]);
     check("filter.error", &[ErrorName::Invariant, ErrorName::Additive]);
     check("motion.yaw_source", &[YawName::Odometry, YawName::Gyro]);
+    check("motion.velocity", &[VelocityName::Measured, VelocityName::Commanded]);
     check("bus.mode", &[BusMode::Peer, BusMode::Client]);
 }
 
@@ -344,4 +346,58 @@ fn a_wrong_type_is_refused_with_its_line() {
 fn a_file_that_is_not_there_is_named() {
     let error = AgentConfig::read(&PathBuf::from("no/such/agent.toml")).unwrap_err().to_string();
     assert!(error.contains("cannot read no/such/agent.toml"), "{error}");
+}
+
+const MODEL: &str = "
+format_version = 1
+noise = { gyro_sigma_rad_s = 0, gps_sigma_m = 0, heading_sigma_rad = 0, range_sigma_m = 0, bearing_sigma_rad = 0, truth_sigma_m = 0, truth_sigma_rad = 0 }
+range_sensor = { max_range_m = 5, min_range_m = 0, half_fov_rad = 1 }
+
+[robots.r1]
+wheel_radius = 0.05
+track_width = 0.3
+encoder_ticks_per_rev = 0
+servo_time_constant_s = 0.1
+servo_time_constant_turn_s = 0.1
+effects = [{ name = 'gps_lever_arm', parameters = { offset_body_m = [0.2, -0.1] } }]
+";
+
+#[test]
+fn a_model_is_found_beside_the_configuration_that_names_it() {
+    let (folder, path) = written(&format!("{LEAST}model = 'models/corrected.toml'\n"));
+    std::fs::create_dir(folder.path().join("models")).unwrap();
+    std::fs::write(folder.path().join("models/corrected.toml"), MODEL).unwrap();
+    let node = AgentConfig::read(&path).unwrap().node().unwrap();
+    let model = node.correction.expect("a model");
+    let effects = &model.correction.given().effects;
+    assert_eq!(effects.iter().map(|own| own.effect().name()).collect::<Vec<_>>(), ["gps_lever_arm"]);
+}
+
+#[test]
+fn a_model_that_cannot_be_used_is_refused_with_both_files_and_the_key() {
+    let cases = [
+        (MODEL, "model.toml", "robot = 2\n", "no section [robots.r2]"),
+        (MODEL, "modle.toml", "robot = 1\n", "modle.toml is missing"),
+        (
+            &MODEL.replace("gps_lever_arm", "gps_lever"),
+            "model.toml",
+            "robot = 1\n",
+            "robots.r1.effects[0].name",
+        ),
+        (
+            &MODEL.replace("-0.1]", "nan]"),
+            "model.toml",
+            "robot = 1\n",
+            "robots.r1.effects[0].parameters.offset_body_m",
+        ),
+        ("[robots.r1]", "model.toml", "robot = 1\n", "`noise`: found nothing"),
+    ];
+    for (model, name, robot, expected) in cases {
+        let (folder, path) = written(&format!("team = 'blue'\n{robot}model = '{name}'\n"));
+        std::fs::write(folder.path().join("model.toml"), model).unwrap();
+        let error = AgentConfig::read(&path).unwrap_err().to_string();
+        for part in [path.to_str().unwrap(), name, expected] {
+            assert!(error.contains(part), "{part:?} is not in: {error}");
+        }
+    }
 }

@@ -5,7 +5,8 @@
 //! hooks of [`EffectModel`]. [`chain`] applies the hooks of a [`RobotModel`] stage by stage and serves a
 //! simulator; [`predict`] does so for one window of a recording, from the measured upstream channel. All of
 //! it is generic over [`Scalar`]: with [`Dual`] a prediction carries its derivatives with respect to any
-//! parameters of effects or of the nominal robot.
+//! parameters of effects or of the nominal robot. [`correct`] goes the other way: it takes effects that are
+//! known out of readings.
 //!
 //! ```
 //! use pleiad_physics::{ActiveEffect, Context, Drive, Effect, Motion, Nominal, Pose, RobotModel, Variable};
@@ -26,6 +27,7 @@
 mod catalogue;
 pub mod chain;
 mod context;
+pub mod correct;
 mod dual;
 mod effect;
 mod effects;

@@ -78,13 +78,6 @@ impl<S: Scalar> Rolling<S> {
             *rolled += distance_m;
         }
     }
-
-    /// Multiplies the distances of both wheels.
-    pub fn scale_both(&mut self, factor: S) {
-        for rolled in &mut self.rolled_m {
-            *rolled *= factor;
-        }
-    }
 }
 
 /// What a swinging castor remembers.
@@ -94,6 +87,8 @@ pub struct Castor<S> {
     pub direction: i8,
     /// Rolled since the direction last reversed, metres; `None` before the first reversal.
     pub since_reversal_m: Option<S>,
+    /// Rolled against the direction so far, metres; from the start on, rolled either way.
+    pub against_m: f64,
 }
 
 /// The motion of the body in a step.

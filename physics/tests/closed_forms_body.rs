@@ -207,4 +207,6 @@ fn reverse_asymmetry_scales_both_rates_while_backing_up() {
     let case = case(Effect::ReverseAsymmetry, &[0.02]);
     case.adds((0.5, 0.3), (0.0, 0.0, 0.0));
     case.adds((-0.5, 0.3), (-0.01, 0.0, 0.006));
+    // In a spin one wheel turns backwards: half of the excess, and a shift of the centre backwards.
+    case.adds((0.0, 2.0), (-0.01 * 2.0 * 0.5 * TRACK_M, 0.0, 0.02));
 }

@@ -141,6 +141,7 @@ fn configuration(
         robot: robot.0,
         strategy: filter.strategy(),
         filter: filter.apply(&noise.filter),
+        model: None,
         prior: None,
         motion: noise.motion.clone(),
         sensors: noise.sensors.clone(),

@@ -125,6 +125,7 @@ impl Stage {
             robot: robot.0,
             strategy: Strategy::Exact,
             filter: FilterSection::default(),
+            model: None,
             prior: self.run.priors.get(&robot).map(agents::prior),
             motion: agents::motion(settings),
             sensors: agents::sensors(settings),

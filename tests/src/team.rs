@@ -103,6 +103,7 @@ impl Team {
                 robot: robot.0,
                 strategy: Strategy::Exact,
                 filter: FilterSection::default(),
+                model: None,
                 prior: world.priors.get(robot).map(agents::prior),
                 motion: agents::motion(&told_as(settings, told.noise)),
                 sensors: agents::sensors(&told_as(settings, told.noise)),

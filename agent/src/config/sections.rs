@@ -85,6 +85,8 @@ pub struct MotionSection {
     pub track_width_m: Option<f64>,
     /// `odometry` or `gyro`.
     pub yaw_source: YawName,
+    /// What velocity odometry is, for a model: `measured` or `commanded`.
+    pub velocity: VelocityName,
     /// Subtracted from the gyro, rad/s.
     pub gyro_bias_rad_s: f64,
     /// Forward noise, m per root second.
@@ -117,6 +119,7 @@ impl Default for MotionSection {
             wheel_radius_m: None,
             track_width_m: None,
             yaw_source: YawName::Odometry,
+            velocity: VelocityName::Measured,
             gyro_bias_rad_s: 0.0,
             forward_m_per_sqrt_s: 0.02,
             lateral_m_per_sqrt_s: 0.0,
@@ -142,6 +145,18 @@ pub enum YawName {
     Odometry,
     /// The gyro.
     Gyro,
+}
+
+/// What velocity odometry is. Only a model makes a difference of it: measured velocity is what the wheels
+/// did, a command is what they were told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VelocityName {
+    /// A measurement.
+    #[default]
+    Measured,
+    /// The command, taken as motion for want of a measurement.
+    Commanded,
 }
 
 /// `[sensors]`: one standard deviation per component, and what is known to be off.

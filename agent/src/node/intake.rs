@@ -121,12 +121,13 @@ impl Node {
     }
 
     fn take(&mut self, sample: Sample) -> Result<(), SampleRefusal> {
+        let sample = self.on_time(sample);
         match sample.reading {
             Reading::Gyro { yaw_rate_rad_s } => {
                 if !yaw_rate_rad_s.is_finite() {
                     return Err(SampleRefusal::BadValue { time: sample.time });
                 }
-                self.dead_reckoning.gyro(sample.time, yaw_rate_rad_s);
+                self.gyro(sample.time, yaw_rate_rad_s);
                 Ok(())
             }
             Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_) => {
@@ -163,16 +164,13 @@ impl Node {
         }
         let gap = end.filter(|last| sample.time.seconds_since(*last) > self.config.longest_gap_s);
         if self.boot.is_none() || gap.is_some() {
-            // A reading of another kind or without geometry is refused before anything begins.
-            let mut fresh = pleiad_estimation::motion::DeadReckoning::new(self.config.motion);
-            fresh.odometry(sample)?;
-            self.dead_reckoning.restart(sample);
+            self.restart(sample)?;
             self.begin_boot(sample.time);
             if let (Some(from), Some(boot)) = (gap, self.boot) {
                 self.notice(Notice::OdometryGap { from, to: sample.time, boot });
             }
-        } else if let Some(step) = self.dead_reckoning.odometry(sample)? {
-            self.segments.extend(&step);
+        } else {
+            self.reckon(sample)?;
         }
         while self.waiting.front().is_some_and(|first| first.time <= sample.time) {
             let Some(observation) = self.waiting.pop_front() else { break };
@@ -244,7 +242,7 @@ fn without_bias(mut sample: Sample, bias_m: f64) -> Sample {
 }
 
 /// Numbers finite, ranges positive.
-fn check_reading(sample: &Sample) -> Result<(), SampleRefusal> {
+pub(super) fn check_reading(sample: &Sample) -> Result<(), SampleRefusal> {
     let range = |range: f64| range.is_finite() && range > 0.0;
     let good = match sample.reading {
         Reading::Gps { x_m, y_m } => x_m.is_finite() && y_m.is_finite(),

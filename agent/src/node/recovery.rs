@@ -1,8 +1,8 @@
 //! A node from the journal of its former life.
 
 use pleiad_estimation::BootIndex;
-use pleiad_estimation::fact::{Body, Boot};
-use pleiad_estimation::sample::Reading;
+use pleiad_estimation::fact::{Body, Boot, Entry};
+use pleiad_estimation::sample::{Reading, Sample};
 
 use super::{Node, Record};
 use crate::config::NodeConfig;
@@ -16,6 +16,8 @@ impl Node {
         // A boot's entries stand before the sample that began it; that sample starts dead reckoning anew.
         // A boot without its sample was lived without this journal and came back from a peer.
         let mut announced: Option<(BootIndex, Boot)> = None;
+        // What was said on a sample stands before it too, and was not known yet when it was taken.
+        let mut said: Vec<Entry> = Vec::new();
         for record in records {
             match record {
                 Record::Entry(entry) => {
@@ -24,26 +26,42 @@ impl Node {
                         if let Body::Boot(boot) = &entry.body {
                             announced = Some((entry.id.boot, *boot));
                         }
+                        if node.corrector.is_some() {
+                            said.push(entry.clone());
+                        }
                     }
                     node.ledger.insert(entry);
                 }
-                Record::Sample(sample) => match sample.reading {
-                    Reading::Gyro { yaw_rate_rad_s } => node.dead_reckoning.gyro(sample.time, yaw_rate_rad_s),
-                    Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_) => {
-                        if let Some((index, boot)) = announced.take_if(|(_, boot)| boot.time == sample.time) {
-                            let horizon = node.config.history_samples;
-                            node.segments.begin(index, boot.time, boot.nominal, horizon);
-                            node.dead_reckoning.restart(sample);
-                        } else if let Ok(Some(step)) = node.dead_reckoning.odometry(sample) {
-                            node.segments.extend(&step);
-                        }
+                Record::Sample(sample) => {
+                    node.relive(sample, &mut announced);
+                    let boot = node.segments.last().map(|(boot, _)| boot);
+                    for entry in said.drain(..).filter(|entry| Some(entry.id.boot) == boot) {
+                        node.hear(&entry);
                     }
-                    // An observation became a fact in the same batch of records, or was never reached by
-                    // the odometry of its boot.
-                    _ => {}
-                },
+                }
             }
         }
         node
+    }
+
+    /// A sample of the journal. An observation became a fact in the same batch of records, or was never
+    /// reached by the odometry of its boot.
+    fn relive(&mut self, sample: Sample, announced: &mut Option<(BootIndex, Boot)>) {
+        let sample = self.on_time(sample);
+        match sample.reading {
+            Reading::Gyro { yaw_rate_rad_s } => self.gyro(sample.time, yaw_rate_rad_s),
+            Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_) => {
+                // Whoever wrote the journal took the sample: nothing is refused now that was not then.
+                if let Some((index, boot)) = announced.take_if(|(_, boot)| boot.time == sample.time) {
+                    let horizon = self.config.history_samples;
+                    if self.restart(sample).is_ok() {
+                        self.segments.begin(index, boot.time, boot.nominal, horizon);
+                    }
+                } else {
+                    let _ = self.reckon(sample);
+                }
+            }
+            _ => {}
+        }
     }
 }

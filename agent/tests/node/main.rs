@@ -13,5 +13,6 @@ mod exactness;
 mod gaps;
 mod halves;
 mod lost_journal;
+mod models;
 mod observations;
 mod recovery;

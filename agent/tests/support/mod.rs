@@ -4,6 +4,7 @@
 #![allow(missing_docs, reason = "a fixture")]
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small numbers of a fixture")]
 
+pub mod model;
 pub mod team;
 
 use pleiad_agent::{AgentConfig, Command, Event, Node, Notice, Record};

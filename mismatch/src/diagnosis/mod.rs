@@ -22,7 +22,7 @@ pub fn probe(recording: &pleiad_recording::Recording) {
     let t = std::time::Instant::now();
     let units: Vec<Unit<'_>> = models.iter().map(|(&r, m)| {
         let f = floors(recording, r);
-        Unit::new(&evidence, 0, r, m.clone(), f) }).collect();
+        Unit::new(&evidence, 0, r, m.clone(), f, recording.nominal.as_ref().map_or(0.0, |n| n.noise.command_jitter_s / 12f64.sqrt())) }).collect();
     let refs: Vec<&Unit<'_>> = units.iter().collect();
     println!("units {:?} rows {:?}", t.elapsed(), units.iter().map(|u| u.rows.len()).collect::<Vec<_>>());
     let entries = entries::entries(&refs);

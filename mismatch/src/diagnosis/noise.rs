@@ -14,8 +14,8 @@ const TRIM: f64 = 9.0;
 const NORMAL_MEAN: f64 = 0.995_007_302_8;
 /// Smallest scale relative to the largest residual: keeps residuals without noise finite.
 const SMALLEST: f64 = 1e-12;
-/// Ratios of agitated to quiet variance that are tried.
-const AGITATIONS: [f64; 9] = [0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
+/// Rounds in which scale and the share of agitated variance settle.
+const AGITATED_ROUNDS: usize = 4;
 
 /// The noise of a unit.
 #[derive(Clone, Debug)]
@@ -54,25 +54,21 @@ pub(crate) fn estimate(unit: &Unit<'_>, residuals: &[f64]) -> Noise {
         per_scale: Vec::new(),
     };
     for own in &members {
-        let mean_agitation =
-            own.iter().map(|&index| unit.rows[index].agitation).sum::<f64>() / own.len().max(1) as f64;
-        let ratios = if mean_agitation > 0.0 { &AGITATIONS[..] } else { &AGITATIONS[..1] };
-        let mut best: Option<(f64, f64, Vec<f64>)> = None;
-        for ratio in ratios {
-            let spread = |&index: &usize| {
-                let relative = unit.rows[index].agitation / mean_agitation.max(f64::MIN_POSITIVE);
-                (1.0 + ratio * relative).sqrt()
-            };
-            let spreads: Vec<f64> = own.iter().map(spread).collect();
-            let mut scaled: Vec<f64> =
-                own.iter().zip(&spreads).map(|(&index, spread)| residuals[index] / spread).collect();
-            let scale = m_scale(&mut scaled);
-            let cost = own.len() as f64 * scale.ln() + spreads.iter().map(|spread| spread.ln()).sum::<f64>();
-            if best.as_ref().is_none_or(|(least, _, _)| cost < *least) {
-                best = Some((cost, scale, spreads));
+        let agitated: Vec<f64> = own.iter().map(|&index| unit.rows[index].agitation).collect();
+        let values: Vec<f64> = own.iter().map(|&index| residuals[index]).collect();
+        let mut spreads = vec![1.0; own.len()];
+        let mut scale = m_scale(&mut values.clone());
+        if agitated.iter().any(|variance| *variance > 0.0) {
+            for _ in 0..AGITATED_ROUNDS {
+                for (spread, variance) in spreads.iter_mut().zip(&agitated) {
+                    *spread = (1.0 + variance / (scale * scale)).sqrt();
+                }
+                let mut scaled: Vec<f64> =
+                    values.iter().zip(&spreads).map(|(value, spread)| value / spread).collect();
+                scale = m_scale(&mut scaled);
             }
         }
-        let (cost, scale, spreads) = best.unwrap_or((0.0, 1.0, Vec::new()));
+        let cost = own.len() as f64 * scale.ln() + spreads.iter().map(|spread| spread.ln()).sum::<f64>();
         for (&index, spread) in own.iter().zip(&spreads) {
             noise.sigma[index] = scale * spread;
         }

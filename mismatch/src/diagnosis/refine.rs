@@ -50,7 +50,7 @@ fn descend(
                 let mut candidate: Candidate = best.candidate.clone();
                 candidate.term.values[parameter] += change;
                 if let Some(next) = score(units, whites, &candidate)
-                    && next.gain() > best.gain() * (1.0 + 1e-9)
+                    && next.step.gain > best.step.gain * (1.0 + 1e-9)
                 {
                     best = next;
                     moved = true;

@@ -172,12 +172,14 @@ fn significant(scored: &[Scored], tests: usize) -> Vec<&Scored> {
             continue;
         }
         let known = best.entry(one.entry()).or_insert(one);
-        if one.gain() > known.gain() {
+        if one.step.gain > known.step.gain {
             *known = one;
         }
     }
     let mut all: Vec<&Scored> = best.into_values().collect();
-    all.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+    // By the likelihood alone: how much errors are correlated depends on what is still missing, and would
+    // favour what explains little.
+    all.sort_by(|a, b| b.step.gain.total_cmp(&a.step.gain));
     all
 }
 
@@ -197,9 +199,9 @@ fn additions(
         groups.entry(one.candidate.term.whose).or_default().push(one);
     }
     groups.remove(&Whose::Everyone);
-    let best_shared = shared.first().map(|best| best.gain());
+    let best_shared = shared.first().map(|best| best.step.gain);
     if let Some(gain) = best_shared
-        && groups.values().all(|own| own[0].gain() < gain)
+        && groups.values().all(|own| own[0].step.gain < gain)
     {
         return choose(units, whites, current, &shared).into_iter().collect();
     }
@@ -207,7 +209,7 @@ fn additions(
     let sharers = units.len().max(1) as f64;
     let groups: Vec<Vec<&Scored>> = groups
         .into_values()
-        .filter(|own| best_shared.is_none_or(|gain| own[0].gain() > 2.0 * gain / sharers))
+        .filter(|own| best_shared.is_none_or(|gain| own[0].step.gain > 2.0 * gain / sharers))
         .collect();
     parallel::map(&groups, |rivals| choose(units, whites, current, rivals)).into_iter().flatten().collect()
 }
@@ -219,11 +221,12 @@ fn choose(
     current: &Fit,
     rivals: &[&Scored],
 ) -> Option<Term> {
-    let fitted: Vec<Option<(f64, Term)>> = parallel::map(&rivals[..rivals.len().min(RIVALS)], |rival| {
+    let rivals = &rivals[..rivals.len().min(RIVALS)];
+    let inflation = rivals.iter().map(|rival| rival.step.inflation).fold(f64::INFINITY, f64::min).max(1.0);
+    let fitted: Vec<Option<(f64, Term)>> = parallel::map(rivals, |rival| {
         let rival = refine(units, whites, rival);
         let added = fit_beside(units, current, rival.term())?;
         let term = added.terms.last()?.clone();
-        let inflation = rival.step.inflation.max(1.0);
         Some((criterion(units, &added, inflation, term.whose), term))
     });
     // Of equals the first: the one whose linearization was the strongest.

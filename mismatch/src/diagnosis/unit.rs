@@ -40,7 +40,8 @@ pub(crate) struct Row {
     pub(crate) time_s: f64,
     pub(crate) regime: Regime,
     pub(crate) target: Option<Target>,
-    /// Variance grows with this where commands jitter; zero for other channels.
+    /// Variance that the declared jitter of commands adds; zero for other channels. Declared and not fitted,
+    /// because a fitted one would swallow every lag: it shows in the same rows.
     pub(crate) agitation: f64,
 }
 
@@ -93,6 +94,7 @@ impl<'a> Unit<'a> {
         robot: RobotId,
         nominal: RobotModel<f64>,
         floors: Floors,
+        jitter_sigma_s: f64,
     ) -> Self {
         let mut unit = Self {
             evidence,
@@ -129,7 +131,7 @@ impl<'a> Unit<'a> {
                         time_s: row.time_s,
                         regime: row.regime,
                         target: row.target,
-                        agitation: row.du_squared()[component],
+                        agitation: row.du_squared()[component] * jitter_sigma_s * jitter_sigma_s,
                     });
                     unit.scale_of.push(first_scale + component);
                 }

@@ -7,8 +7,8 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::diagnosis::fit::State;
-use crate::diagnosis::noise::CLIP;
-use crate::diagnosis::unit::{Column, Unit};
+use crate::diagnosis::noise;
+use crate::diagnosis::unit::{Column, Stretch, Unit};
 
 /// The least variance of a score, as a share of that of independent errors.
 const LEAST_SHARE: f64 = 0.5;
@@ -16,32 +16,31 @@ const LEAST_SHARE: f64 = 0.5;
 /// A unit with its residuals in sigmas and the columns of a model, all in sigmas.
 pub(crate) struct White<'u, 'a> {
     pub(crate) unit: &'u Unit<'a>,
-    /// Residuals in sigmas, clipped.
+    /// Residuals in sigmas, times the root of their weight.
     pub(crate) errors: Vec<f64>,
-    /// Sigmas.
-    sigma: &'u [f64],
+    /// What residuals and columns are multiplied by: the root of the weight over sigma. Both alike, so that an
+    /// effect far above the noise is seen at its size; what it does not explain pulls no more than it may.
+    factors: Vec<f64>,
     /// What the model's parameters predict, per parameter: minus the derivative of the residual.
     active: Vec<Vec<Option<Vec<f64>>>>,
 }
 
 impl<'u, 'a> White<'u, 'a> {
-    pub(crate) fn new(unit: &'u Unit<'a>, state: &'u State, columns: &[Column]) -> Self {
-        let clip = |(residual, sigma): (&f64, &f64)| (residual / sigma).clamp(-CLIP, CLIP);
-        let mut white = Self {
-            unit,
-            errors: state.residuals.iter().zip(&state.noise.sigma).map(clip).collect(),
-            sigma: &state.noise.sigma,
-            active: Vec::new(),
-        };
+    pub(crate) fn new(unit: &'u Unit<'a>, state: &State, columns: &[Column]) -> Self {
+        let factor =
+            |(residual, sigma): (&f64, &f64)| noise::weight(residual / sigma).sqrt() / sigma;
+        let factors: Vec<f64> = state.residuals.iter().zip(&state.noise.sigma).map(factor).collect();
+        let errors = state.residuals.iter().zip(&factors).map(|(residual, factor)| residual * factor).collect();
+        let mut white = Self { unit, errors, factors, active: Vec::new() };
         white.active = columns.iter().map(|column| white.of(column)).collect();
         white
     }
 
     /// A column in sigmas, per stretch.
     fn of(&self, column: &Column) -> Vec<Option<Vec<f64>>> {
-        let part = |(part, stretch): (&Option<Vec<f64>>, &crate::diagnosis::unit::Stretch)| {
-            let sigma = &self.sigma[stretch.range()];
-            part.as_ref().map(|part| part.iter().zip(sigma).map(|(value, sigma)| -value / sigma).collect())
+        let part = |(part, stretch): (&Option<Vec<f64>>, &Stretch)| {
+            let factors = &self.factors[stretch.range()];
+            part.as_ref().map(|part| part.iter().zip(factors).map(|(value, factor)| -value * factor).collect())
         };
         column.parts.iter().zip(&self.unit.stretches).map(part).collect()
     }

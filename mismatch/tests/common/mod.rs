@@ -1,5 +1,9 @@
 //! A recording made by the signal chain itself, with noise of known size.
 
+#![allow(dead_code, reason = "every test file uses a part of it")]
+
+pub mod commanded;
+
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
 use pleiad_estimation::{LandmarkId, Pose2, RobotId, Timestamp};
 use pleiad_mismatch::nominal_model;

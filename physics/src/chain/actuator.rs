@@ -59,15 +59,26 @@ pub fn schedule<S: Scalar>(
     for (position, &command) in commands.iter().enumerate() {
         let mut context = Context::new(&model.nominal, command.time_s, Motion::at_rest(Pose::identity()));
         context.chance = chance(position);
-        let mut timing = CommandTiming { delay_s: model.nominal.command_latency_s, lost: false };
-        model.apply(&context, |effect, values| effect.command_timing(values, &context, &mut timing));
-        if !timing.lost {
-            let own = timing.delay_s + command.time_s;
-            let from_s = scheduled.last().map_or(own, |last| own.max(last.from_s));
-            scheduled.push(Scheduled { from_s, command });
-        }
+        schedule_next(model, &context, command, &mut scheduled);
     }
     scheduled
+}
+
+/// Appends one command to those that are scheduled, unless it is lost. The context is that of the instant at
+/// which it was given.
+pub fn schedule_next<S: Scalar>(
+    model: &RobotModel<S>,
+    context: &Context<S>,
+    command: Command,
+    scheduled: &mut Vec<Scheduled<S>>,
+) {
+    let mut timing = CommandTiming { delay_s: model.nominal.command_latency_s, lost: false };
+    model.apply(context, |effect, values| effect.command_timing(values, context, &mut timing));
+    if !timing.lost {
+        let own = timing.delay_s + command.time_s;
+        let from_s = scheduled.last().map_or(own, |last| own.max(last.from_s));
+        scheduled.push(Scheduled { from_s, command });
+    }
 }
 
 /// The angles in radians by which the left and right wheel turn from `from_s` to `to_s`.

@@ -6,6 +6,9 @@ use crate::pose::Pose;
 use crate::scalar::Scalar;
 use crate::signal::{BodyMotion, Castor, Geometry, MapMotion, Rolling};
 
+/// A castor turns round once the robot has rolled so far the other way, metres: a few ticks of an encoder.
+const CASTOR_PLAY_M: f64 = 0.001;
+
 /// What the body remembers from step to step.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyState<S> {
@@ -17,7 +20,33 @@ pub struct BodyState<S> {
 
 impl<S: Scalar> Default for BodyState<S> {
     fn default() -> Self {
-        Self { speed_m_s: None, castor: Castor { direction: 0, since_reversal_m: None } }
+        Self { speed_m_s: None, castor: Castor { direction: 0, since_reversal_m: None, against_m: 0.0 } }
+    }
+}
+
+/// What a step adds to a pose, and the mean velocities in it.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyIncrement<S> {
+    /// Driven, in the frame of the robot at the beginning.
+    pub driven: Pose<S>,
+    /// What the surroundings add, in the map.
+    pub added: MapMotion<S>,
+    /// Mean forward speed, m/s.
+    pub speed_m_s: S,
+    /// Mean yaw rate, rad/s.
+    pub yaw_rate_rad_s: S,
+    /// Change of speed from the step before, m/s^2.
+    pub acceleration_m_s2: S,
+}
+
+impl<S: Scalar> BodyIncrement<S> {
+    /// The pose at the end of a step that began at `start`.
+    pub fn applied_to(&self, start: &Pose<S>) -> Pose<S> {
+        let mut pose = start.compose(&self.driven);
+        pose.x_m += self.added.shift_m[0];
+        pose.y_m += self.added.shift_m[1];
+        pose.yaw_rad += self.added.yaw_rad;
+        pose
     }
 }
 
@@ -44,6 +73,23 @@ pub fn advance<S: Scalar>(
     turned_rad: [S; 2],
     state: &mut BodyState<S>,
 ) -> BodyStep<S> {
+    let increment = increment(model, context, turned_rad, state);
+    BodyStep {
+        pose: increment.applied_to(&context.motion.pose),
+        speed_m_s: increment.speed_m_s,
+        yaw_rate_rad_s: increment.yaw_rate_rad_s,
+        acceleration_m_s2: increment.acceleration_m_s2,
+    }
+}
+
+/// What [`advance`] adds to a pose. A simulator gives the context the pose in the middle of the step, where
+/// effects of place and heading are at their mean.
+pub fn increment<S: Scalar>(
+    model: &RobotModel<S>,
+    context: &Context<S>,
+    turned_rad: [S; 2],
+    state: &mut BodyState<S>,
+) -> BodyIncrement<S> {
     let step_s = context.step_s;
     let geometry = geometry(model, context);
     let [left, right] = geometry.wheel_radius_m;
@@ -65,17 +111,13 @@ pub fn advance<S: Scalar>(
     if let Some(since) = &mut state.castor.since_reversal_m {
         *since += forward_m.abs();
     }
-
-    let mut pose = context.motion.pose.compose(&Pose::exp(body.forward_m, body.left_m, body.yaw_rad));
     let mut added = MapMotion { shift_m: [S::zero(); 2], yaw_rad: S::zero() };
     model.apply(&context, |effect, values| effect.world(values, &context, &mut added));
-    pose.x_m += added.shift_m[0];
-    pose.y_m += added.shift_m[1];
-    pose.yaw_rad += added.yaw_rad;
 
     state.speed_m_s = Some(speed);
-    BodyStep {
-        pose,
+    BodyIncrement {
+        driven: Pose::exp(body.forward_m, body.left_m, body.yaw_rad),
+        added,
         speed_m_s: body.forward_m / step_s,
         yaw_rate_rad_s: (body.yaw_rad + added.yaw_rad) / step_s,
         acceleration_m_s2: context.motion.acceleration_m_s2,
@@ -119,17 +161,25 @@ fn kinematics<S: Scalar>(
     (forward, yaw)
 }
 
-/// Notes a reversal; the castor begins to swing round in the step that reverses.
+/// Notes a reversal; the castor begins to swing round in the step in which the robot has rolled
+/// [`CASTOR_PLAY_M`] the other way. Less is no reversal: a robot that spins does not roll, but for the ticks of
+/// its encoders.
 fn turn_castor<S: Scalar>(castor: &mut Castor<S>, forward_m: S) {
-    let direction = match forward_m.value() {
-        forward if forward > 0.0 => 1,
-        forward if forward < 0.0 => -1,
-        _ => return,
-    };
-    if castor.direction == -direction {
-        castor.since_reversal_m = Some(S::zero());
+    let forward_m = forward_m.value();
+    if castor.direction == 0 {
+        castor.against_m += forward_m;
+        if castor.against_m.abs() > CASTOR_PLAY_M {
+            castor.direction = if castor.against_m > 0.0 { 1 } else { -1 };
+            castor.against_m = 0.0;
+        }
+        return;
     }
-    castor.direction = direction;
+    castor.against_m = (castor.against_m - f64::from(castor.direction) * forward_m).max(0.0);
+    if castor.against_m > CASTOR_PLAY_M {
+        castor.since_reversal_m = Some(S::zero());
+        castor.direction = -castor.direction;
+        castor.against_m = 0.0;
+    }
 }
 
 #[cfg(test)]
@@ -167,10 +217,24 @@ mod tests {
 
     #[test]
     fn a_castor_begins_to_swing_at_a_reversal_only() {
-        let mut castor = Castor { direction: 0, since_reversal_m: None };
+        let mut castor = Castor { direction: 0, since_reversal_m: None, against_m: 0.0 };
         for (forward, reversed) in [(0.1, false), (0.0, false), (0.2, false), (-0.1, true)] {
             turn_castor(&mut castor, forward);
             assert_eq!(castor.since_reversal_m.is_some(), reversed);
         }
+    }
+
+    #[test]
+    fn ticks_of_the_encoders_are_no_reversal_and_a_slow_one_is() {
+        let mut castor = Castor { direction: 1, since_reversal_m: None, against_m: 0.0 };
+        for _ in 0..1000 {
+            turn_castor(&mut castor, 3e-4);
+            turn_castor(&mut castor, -3e-4);
+        }
+        assert_eq!(castor.since_reversal_m, None);
+        for _ in 0..1000 {
+            turn_castor(&mut castor, -2e-6);
+        }
+        assert_eq!((castor.since_reversal_m, castor.direction), (Some(0.0), -1));
     }
 }

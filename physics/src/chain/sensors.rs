@@ -65,6 +65,13 @@ pub fn gyro<S: Scalar>(model: &RobotModel<S>, context: &Context<S>, walk_rad_s: 
 
 /// Position as read, metres in the map.
 pub fn gps<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> [S; 2] {
+    let reading = gps_reading(model, context);
+    let pose = context.motion.carried(-(reading.latency_s + clock_error_s(model, context)));
+    antenna(&reading, &pose)
+}
+
+/// How GPS sees the robot: where the antenna is, how late and how wrong.
+pub fn gps_reading<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> GpsReading<S> {
     let nominal = &model.nominal;
     let mut reading = GpsReading {
         lever_m: [nominal.gps_mount_x_m, nominal.gps_mount_y_m],
@@ -72,7 +79,11 @@ pub fn gps<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> [S; 2] {
         error_m: [S::zero(); 2],
     };
     model.apply(context, |effect, values| effect.gps(values, context, &mut reading));
-    let pose = context.motion.carried(-(reading.latency_s + clock_error_s(model, context)));
+    reading
+}
+
+/// The position read with the robot at this pose, metres in the map.
+pub fn antenna<S: Scalar>(reading: &GpsReading<S>, pose: &Pose<S>) -> [S; 2] {
     let [x, y] = pose.rotate(reading.lever_m);
     [pose.x_m + x + reading.error_m[0], pose.y_m + y + reading.error_m[1]]
 }
@@ -80,7 +91,12 @@ pub fn gps<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> [S; 2] {
 /// Heading as read, radians, not wrapped.
 pub fn heading<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> S {
     let pose = context.motion.carried(-clock_error_s(model, context));
-    let mut reading = HeadingReading { heading_rad: pose.yaw_rad };
+    heading_of(model, context, pose.yaw_rad)
+}
+
+/// Heading as read by a robot that has this one, radians, not wrapped.
+pub fn heading_of<S: Scalar>(model: &RobotModel<S>, context: &Context<S>, heading_rad: S) -> S {
+    let mut reading = HeadingReading { heading_rad };
     model.apply(context, |effect, values| effect.heading(values, context, &mut reading));
     reading.heading_rad
 }
@@ -105,23 +121,44 @@ impl Seen {
 
 /// Range and bearing as read.
 pub fn sighting<S: Scalar>(model: &RobotModel<S>, context: &Context<S>, seen: &Seen) -> Sighting<S> {
+    let geometry = sighting_geometry(model, context, seen.target, seen.position_m);
+    let age_s = geometry.latency_s + clock_error_s(model, context);
+    let map_from_sensor = context.motion.carried(-age_s).compose(&sensor(&geometry));
+    let mut target_m = geometry.target_m;
+    for (coordinate, velocity) in target_m.iter_mut().zip(seen.velocity_m_s) {
+        *coordinate -= age_s * velocity;
+    }
+    sighting_of(model, context, map_from_sensor.point_seen(target_m))
+}
+
+/// From where, when and at what the range sensor looks: `target_m` is where the map has the target, and what
+/// comes back where it is.
+pub fn sighting_geometry<S: Scalar>(
+    model: &RobotModel<S>,
+    context: &Context<S>,
+    target: Target,
+    target_m: [f64; 2],
+) -> SightingGeometry<S> {
     let nominal = &model.nominal;
     let mut geometry = SightingGeometry {
-        target: seen.target,
-        target_m: seen.position_m.map(S::constant),
+        target,
+        target_m: target_m.map(S::constant),
         lever_m: [nominal.sensor_mount_x_m, nominal.sensor_mount_y_m],
         yaw_rad: nominal.sensor_mount_yaw_rad,
         latency_s: nominal.sensor_latency_s,
     };
     model.apply(context, |effect, values| effect.sighting_geometry(values, context, &mut geometry));
-    let age_s = geometry.latency_s + clock_error_s(model, context);
-    let [forward, left] = geometry.lever_m;
-    let map_from_sensor = context.motion.carried(-age_s).compose(&Pose::new(forward, left, geometry.yaw_rad));
-    let mut target_m = geometry.target_m;
-    for (coordinate, velocity) in target_m.iter_mut().zip(seen.velocity_m_s) {
-        *coordinate -= age_s * velocity;
-    }
-    let [x, y] = map_from_sensor.point_seen(target_m);
+    geometry
+}
+
+/// `robot_from_sensor`.
+pub fn sensor<S: Scalar>(geometry: &SightingGeometry<S>) -> Pose<S> {
+    Pose::new(geometry.lever_m[0], geometry.lever_m[1], geometry.yaw_rad)
+}
+
+/// Range and bearing as read of a target that is here in the frame of the sensor, metres.
+pub fn sighting_of<S: Scalar>(model: &RobotModel<S>, context: &Context<S>, [x, y]: [S; 2]) -> Sighting<S> {
+    let nominal = &model.nominal;
     let range = x.hypot(y);
     let mut sighting = Sighting {
         range_m: nominal.range_scale * range + nominal.range_bias_m,
@@ -139,14 +176,14 @@ pub fn truth<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> Pose<S> 
 }
 
 /// How the reference system sees the robot: where the marker is, and how late.
-pub(crate) fn truth_reading<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> TruthReading<S> {
+pub fn truth_reading<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> TruthReading<S> {
     let mut reading = TruthReading { lever_m: [S::zero(); 2], yaw_rad: S::zero(), latency_s: S::zero() };
     model.apply(context, |effect, values| effect.truth(values, context, &mut reading));
     reading
 }
 
 /// `robot_from_marker`.
-pub(crate) fn marker<S: Scalar>(reading: &TruthReading<S>) -> Pose<S> {
+pub fn marker<S: Scalar>(reading: &TruthReading<S>) -> Pose<S> {
     Pose::new(reading.lever_m[0], reading.lever_m[1], reading.yaw_rad)
 }
 

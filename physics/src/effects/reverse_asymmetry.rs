@@ -1,4 +1,5 @@
-//! Entry 56. While the robot backs up, its wheels roll farther per turn.
+//! Entry 56. A wheel that turns backwards rolls farther per turn. By wheel and not by robot, so that a spin,
+//! in which the robot's speed is zero but for roundings, is well defined: one wheel turns backwards.
 
 use crate::context::Context;
 use crate::effect::EffectModel;
@@ -19,14 +20,16 @@ impl EffectModel for ReverseAsymmetry {
         bad_data: false,
         parameters: &[Parameter::smooth("relative", "1", (-0.1, 0.1), Relevance::Size(0.001))],
         channels: &[Channel::Encoders, Channel::Truth],
-        equation: "where v < 0: dx = relative v, dw = relative w",
+        equation: "a wheel with dtheta < 0 rolls r (1 + relative) dtheta; where both do: dx = relative v, dw = relative w",
         confounded_with: "wheel_radius_error with one direction",
         broken_by: "both directions",
     };
 
-    fn rolling<S: Scalar>(values: &[S], context: &Context<S>, signal: &mut Rolling<S>) {
-        if context.motion.speed_m_s < 0.0 {
-            signal.scale_both(values[0] + 1.0);
+    fn rolling<S: Scalar>(values: &[S], _context: &Context<S>, signal: &mut Rolling<S>) {
+        for (rolled, turned) in signal.rolled_m.iter_mut().zip(signal.turned_rad) {
+            if turned < 0.0 {
+                *rolled *= values[0] + 1.0;
+            }
         }
     }
 }

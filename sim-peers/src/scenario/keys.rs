@@ -5,15 +5,16 @@
 
 use std::collections::BTreeMap;
 
+use pleiad_recording::{EffectSpec, ScopeSpec};
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-use super::load::Document;
-use super::{RobotSettings, Start};
+use super::load::{Document, EFFECTS};
+use super::{Declared, RobotSettings, Start};
 use crate::Error;
 
 /// Keys whose value is one of a few words, by the end of their path.
-const CHOICES: [(&str, &[&str]); 5] = [
+const CHOICES: [(&str, &[&str]); 6] = [
     (
         "motion.policy",
         &[
@@ -25,8 +26,11 @@ const CHOICES: [(&str, &[&str]); 5] = [
             "parked",
             "portable_landmarks",
             "one_mover",
+            "manoeuvres",
+            "script",
         ],
     ),
+    ("drive.kind", &["differential", "skid_steer", "car_like"]),
     ("motion.direction", &["counter_clockwise", "clockwise"]),
     ("odometry.kind", &["velocity", "wheels", "increment"]),
     ("relative.kind", &["range_bearing", "pose", "position", "range", "bearing"]),
@@ -59,8 +63,13 @@ impl Lines {
 pub(super) fn template() -> Result<Table, toml::ser::Error> {
     let mut settings = RobotSettings { start: Some(Start::default()), ..RobotSettings::default() };
     settings.motion.area_m = Some([0.0; 4]);
+    settings.motion.script = vec![[0.0; 3]];
     settings.gps.windows_s = vec![[0.0; 2]];
-    let defaults = Table::try_from(&settings)?;
+    settings.declared = Declared::example();
+    let mut defaults = Table::try_from(&settings)?;
+    let within = ScopeSpec { region_m: Some([0.0; 4]), time_s: Some([0.0; 2]) };
+    let effect = EffectSpec { within: Some(within), ..EffectSpec::default() };
+    defaults.insert(EFFECTS.to_owned(), Value::Array(vec![Value::try_from(effect)?]));
     let mut robot = defaults.clone();
     robot.insert("id".to_owned(), Value::Integer(1));
     Table::try_from(Document::example(defaults, robot))
@@ -126,6 +135,8 @@ impl Walk<'_> {
             expected: expected.to_owned(),
         };
         match (expected, found.get_ref()) {
+            // The parameters of an effect: its catalogue entry knows them.
+            (Value::Table(known), DeValue::Table(_)) if known.is_empty() => Ok(()),
             (Value::Table(known), DeValue::Table(table)) => self.table(table, known, path),
             (Value::Array(known), DeValue::Array(items)) => {
                 let Some(expected) = known.first() else { return Ok(()) };

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use pleiad_estimation::{LandmarkId, RobotId};
+use pleiad_physics::ActiveEffect;
+use pleiad_recording::EffectSpec;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
@@ -11,6 +13,11 @@ use super::keys::{self, Lines};
 use super::validate::Invalid;
 use super::{Arena, RobotSettings, Scenario};
 use crate::Error;
+
+/// The settings of every robot.
+const DEFAULTS: &str = "defaults";
+/// The effects of the defaults or of a robot.
+pub(super) const EFFECTS: &str = "effects";
 
 /// The file as it is written.
 #[derive(Debug, Serialize, Deserialize)]
@@ -24,6 +31,10 @@ pub(super) struct Document {
     arena: Arena,
     #[serde(default = "truth_rate_hz")]
     truth_rate_hz: f64,
+    #[serde(default)]
+    truth_sigma_m: f64,
+    #[serde(default)]
+    truth_sigma_rad: f64,
     #[serde(default)]
     team_size: u32,
     #[serde(default)]
@@ -63,6 +74,8 @@ impl Document {
             duration_s: 0.0,
             arena: Arena::default(),
             truth_rate_hz: truth_rate_hz(),
+            truth_sigma_m: 0.0,
+            truth_sigma_rad: 0.0,
             team_size: 0,
             random_landmarks: 0,
             landmarks: vec![Landmark { id: 0, x_m: 0.0, y_m: 0.0 }],
@@ -110,7 +123,7 @@ impl Loader<'_> {
         let mut robots = BTreeMap::new();
         let mut listed = BTreeMap::new();
         for id in 1..=document.team_size {
-            robots.insert(RobotId(id), self.settings(&document.defaults, "defaults")?);
+            robots.insert(RobotId(id), self.settings(&document.defaults, None)?);
         }
         for (index, table) in document.robots.iter().enumerate() {
             let path = format!("robots[{index}]");
@@ -121,7 +134,7 @@ impl Loader<'_> {
             }
             let mut own = table.clone();
             own.remove("id");
-            robots.insert(id, self.settings(&merge(&document.defaults, &own), &path)?);
+            robots.insert(id, self.settings(&document.defaults, Some((&own, &path)))?);
         }
         let mut landmarks = BTreeMap::new();
         for (index, landmark) in document.landmarks.iter().enumerate() {
@@ -138,6 +151,8 @@ impl Loader<'_> {
             duration_s: document.duration_s,
             arena: document.arena,
             truth_rate_hz: document.truth_rate_hz,
+            truth_sigma_m: document.truth_sigma_m,
+            truth_sigma_rad: document.truth_sigma_rad,
             landmarks,
             random_landmarks: document.random_landmarks,
             robots,
@@ -158,11 +173,39 @@ impl Loader<'_> {
         }
     }
 
-    fn settings(&self, table: &Table, path: &str) -> Result<RobotSettings, Error> {
-        table.clone().try_into().map_err(|error: toml::de::Error| Error::Syntax {
+    /// The defaults with a robot's own keys over them; its effects come after those of the defaults.
+    fn settings(&self, defaults: &Table, own: Option<(&Table, &str)>) -> Result<RobotSettings, Error> {
+        let mut effects = self.effects(defaults, DEFAULTS)?;
+        let mut table = defaults.clone();
+        if let Some((own, path)) = own {
+            effects.extend(self.effects(own, path)?);
+            table = merge(defaults, own);
+        }
+        table.remove(EFFECTS);
+        let path = own.map_or(DEFAULTS, |(_, path)| path);
+        let mut settings: RobotSettings = table.try_into().map_err(|error| self.syntax(path, &error))?;
+        settings.effects = effects;
+        Ok(settings)
+    }
+
+    fn effects(&self, table: &Table, path: &str) -> Result<Vec<ActiveEffect<f64>>, Error> {
+        let listed = table.get(EFFECTS).and_then(Value::as_array).into_iter().flatten();
+        let effect = |(index, value): (usize, &Value)| {
+            let path = format!("{path}.{EFFECTS}[{index}]");
+            let spec: EffectSpec = value.clone().try_into().map_err(|error| self.syntax(&path, &error))?;
+            let declared = spec.declared().map_err(|wrong| {
+                self.error(&format!("{path}.{}", wrong.key), &wrong.found, &wrong.expected)
+            })?;
+            Ok(declared.active)
+        };
+        listed.enumerate().map(effect).collect()
+    }
+
+    fn syntax(&self, path: &str, error: &toml::de::Error) -> Error {
+        Error::Syntax {
             place: keys::place(self.file, self.lines.find(path)),
             message: error.to_string().trim().replace('\n', " "),
-        })
+        }
     }
 
     fn error(&self, path: &str, found: &impl ToString, expected: &str) -> Error {

@@ -1,6 +1,8 @@
 //! A scenario: who takes part, how they move, what they sense and how well. The file format is TOML;
 //! every key is described in `docs/scenario.md`.
 
+mod declared;
+mod drive;
 mod keys;
 mod load;
 mod settings;
@@ -11,6 +13,8 @@ use std::collections::BTreeMap;
 use pleiad_estimation::{LandmarkId, RobotId};
 use serde::{Deserialize, Serialize};
 
+pub use declared::Declared;
+pub use drive::{DriveKind, DriveSettings};
 pub use settings::{
     Direction, Gps, Gyro, Heading, Motion, MotionNoise, Odometry, OdometryKind, Policy, PriorSettings,
     RelativeKind, RelativeSensor, RobotSettings, See, Start,
@@ -29,6 +33,10 @@ pub struct Scenario {
     pub arena: Arena,
     /// Rate of the ground truth in the recording, Hz.
     pub truth_rate_hz: f64,
+    /// Noise of the ground truth per axis, metres.
+    pub truth_sigma_m: f64,
+    /// Noise of the heading of the ground truth, radians.
+    pub truth_sigma_rad: f64,
     /// Landmarks at given places, metres.
     pub landmarks: BTreeMap<LandmarkId, [f64; 2]>,
     /// Further landmarks at random places, numbered on from the largest given one.

@@ -1,7 +1,11 @@
 //! The settings of one robot. Units are in the names; meanings and defaults are listed for users in
 //! `docs/scenario.md`.
 
+use pleiad_physics::ActiveEffect;
 use serde::{Deserialize, Serialize};
+
+use super::declared::Declared;
+use super::drive::DriveSettings;
 
 /// Everything about one robot: body, motion, prior, sensors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,12 +19,23 @@ pub struct RobotSettings {
     pub track_width_m: f64,
     /// Encoder counts per turn of a wheel; 0 means no quantization.
     pub encoder_ticks_per_rev: u32,
-    /// Rate of the velocity commands, Hz; rounded so that a whole number of odometry ticks lies between two.
+    /// Rate of the velocity commands, Hz.
     pub command_rate_hz: f64,
     /// Time constant of the forward speed behind its command, seconds.
     pub servo_time_constant_s: f64,
     /// Time constant of the yaw rate behind its command, seconds.
     pub servo_time_constant_turn_s: f64,
+    /// Commands take effect up to this much later than they are given, uniformly, seconds.
+    pub command_jitter_s: f64,
+    /// Change of the supply voltage, V/s; felt by `battery_sag` alone.
+    pub voltage_rate_v_per_s: f64,
+    /// How its wheels make it move.
+    pub drive: DriveSettings,
+    /// What `nominal.toml` says of it where that is not the truth.
+    pub declared: Declared,
+    /// What acts on it besides: written as `[[robots.effects]]` or `[[defaults.effects]]`.
+    #[serde(skip)]
+    pub effects: Vec<ActiveEffect<f64>>,
     /// What is known of the start.
     pub prior: PriorSettings,
     /// How it moves.
@@ -47,6 +62,11 @@ impl Default for RobotSettings {
             command_rate_hz: 25.0,
             servo_time_constant_s: 0.1,
             servo_time_constant_turn_s: 0.1,
+            command_jitter_s: 0.0,
+            voltage_rate_v_per_s: 0.0,
+            drive: DriveSettings::default(),
+            declared: Declared::default(),
+            effects: Vec::new(),
             prior: PriorSettings::default(),
             motion: Motion::default(),
             odometry: Odometry::default(),
@@ -89,12 +109,12 @@ impl Default for PriorSettings {
 }
 
 /// How a robot moves.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Motion {
     /// Which rule.
     pub policy: Policy,
-    /// Cruising speed (the fastest of `waypoints_random`), m/s.
+    /// Cruising speed (the fastest of `waypoints_random` and `manoeuvres`), m/s.
     pub speed_m_s: f64,
     /// Slowest cruising speed of `waypoints_random`, m/s.
     pub min_speed_m_s: f64,
@@ -108,8 +128,11 @@ pub struct Motion {
     pub side_m: f64,
     /// Length of a turn to move under `portable_landmarks` and `one_mover`, seconds.
     pub move_s: f64,
-    /// Where random waypoints lie, `[x_min, x_max, y_min, y_max]`; `None` means the whole arena.
+    /// Where random waypoints lie, `[x_min, x_max, y_min, y_max]`; `None` means the whole arena, or under
+    /// `manoeuvres` the robot's share of it.
     pub area_m: Option<[f64; 4]>,
+    /// What `script` commands: `[forward m/s, yaw rate rad/s, seconds]`, one after the other.
+    pub script: Vec<[f64; 3]>,
     /// Distance wandering robots try to keep from others, metres; 0 means they do not look.
     pub keep_away_m: f64,
 }
@@ -126,6 +149,7 @@ impl Default for Motion {
             side_m: 4.0,
             move_s: 15.0,
             area_m: None,
+            script: Vec::new(),
             keep_away_m: 0.5,
         }
     }
@@ -152,6 +176,10 @@ pub enum Policy {
     PortableLandmarks,
     /// One robot after the other wanders while the rest stand (millibots).
     OneMover,
+    /// Everything that tells effects apart, in random order, within the robot's own area.
+    Manoeuvres,
+    /// The commands of [`Motion::script`], then standing still.
+    Script,
 }
 
 /// A sense of turning.
@@ -170,7 +198,7 @@ pub enum Direction {
 pub struct Odometry {
     /// In which form.
     pub kind: OdometryKind,
-    /// Rate, Hz; also the tick on which the wheels hold their speed.
+    /// Rate, Hz; also the tick over which the body departs from the wheels.
     pub rate_hz: f64,
     /// How the body departs from what the wheels did.
     pub noise: MotionNoise,

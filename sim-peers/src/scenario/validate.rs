@@ -13,6 +13,9 @@ const LEAST_ODOMETRY_HZ: f64 = 5.0;
 /// No channel is faster, Hz.
 const GREATEST_RATE_HZ: f64 = 1000.0;
 
+/// A wheel steered farther than this would not roll, radians.
+const GREATEST_STEER_RAD: f64 = 1.5;
+
 /// A value that makes no sense, without its place.
 #[derive(Debug)]
 pub(super) struct Invalid {
@@ -42,6 +45,8 @@ impl Scenario {
         team.above_zero("arena.width_m", self.arena.width_m)?;
         team.above_zero("arena.height_m", self.arena.height_m)?;
         team.rate("truth_rate_hz", self.truth_rate_hz, f64::MIN_POSITIVE)?;
+        team.not_negative("truth_sigma_m", self.truth_sigma_m)?;
+        team.not_negative("truth_sigma_rad", self.truth_sigma_rad)?;
         if self.robots.is_empty() {
             return Err(team.invalid("robots", "empty", "at least one robot: give team_size or [[robots]]"));
         }
@@ -77,6 +82,22 @@ impl Check {
         self.above_zero("servo_time_constant_s", settings.servo_time_constant_s)?;
         self.above_zero("servo_time_constant_turn_s", settings.servo_time_constant_turn_s)?;
         self.rate("command_rate_hz", settings.command_rate_hz, f64::MIN_POSITIVE)?;
+        self.not_negative("command_jitter_s", settings.command_jitter_s)?;
+        self.finite("voltage_rate_v_per_s", settings.voltage_rate_v_per_s)?;
+        self.above_zero("drive.track_ratio", settings.drive.track_ratio)?;
+        self.above_zero("drive.wheelbase_m", settings.drive.wheelbase_m)?;
+        self.above_zero("drive.max_steer_rad", settings.drive.max_steer_rad)?;
+        self.between("drive.max_steer_rad", settings.drive.max_steer_rad, 0.0, GREATEST_STEER_RAD)?;
+        for (key, value) in settings.declared.values() {
+            let key = format!("declared.{key}");
+            if key.ends_with("wheel_radius") || key.ends_with("track_width") || key.ends_with("gyro_scale") {
+                self.above_zero(&key, value)?;
+            } else if key.contains("servo") || key.contains("ticks") {
+                self.not_negative(&key, value)?;
+            } else {
+                self.finite(&key, value)?;
+            }
+        }
         self.above_zero("prior.sigma_position_m", settings.prior.sigma_position_m)?;
         self.above_zero("prior.sigma_heading_rad", settings.prior.sigma_heading_rad)
     }
@@ -111,6 +132,12 @@ impl Check {
         self.above_zero("motion.radius_m", motion.radius_m)?;
         self.above_zero("motion.side_m", motion.side_m)?;
         self.above_zero("motion.move_s", motion.move_s)?;
+        for row in &motion.script {
+            if !(row.iter().all(|value| value.is_finite()) && row[2] > 0.0) {
+                let expected = "finite numbers [forward m/s, yaw rate rad/s, seconds] with seconds above 0";
+                return Err(self.invalid("motion.script", &format!("{row:?}"), expected));
+            }
+        }
         self.not_negative("motion.keep_away_m", motion.keep_away_m)
     }
 

@@ -1,25 +1,31 @@
 //! The simulated world: true motion first, then every sensor of every robot, sampled from it.
 //!
-//! A robot's wheels hold their speed over each tick of its odometry. Over a tick in which the wheels say
-//! `U = exp((v dt, 0, w dt))` the body moves by `U exp(n)`, `n ~ N(0, Q dt)` white from tick to tick and
-//! independent of everything else; odometry reports `U` without error. So a filter that integrates
-//! the reports and adds `Ad_N Q dt Ad_N^T` (N after the step) has exactly the law of this world. Within a
-//! tick `n` grows as a Brownian motion, whose variance is the linear `C(t)` such a filter interpolates.
+//! A command goes through the signal chain of `physics`: servo, wheels, body, with the effects that act on
+//! the robot. Besides, the body departs from what its wheels do by the noise of the odometry: over a tick in
+//! which they say `U = exp((v dt, 0, w dt))` it moves by `U exp(n)`, `n ~ N(0, Q dt)` white from tick to
+//! tick and independent of everything else; odometry reports `U` without error. So a filter that integrates
+//! the reports and adds `Ad_N Q dt Ad_N^T` (N after the step) has the law of this world, but for changes of
+//! speed within a tick, which are a tenth of a sigma at most. Within a tick `n` grows as a Brownian motion,
+//! whose variance is the linear `C(t)` such a filter interpolates.
 
 mod connectivity;
 mod drive;
+mod model;
 mod nominal;
 mod placement;
 mod policy;
 mod random;
 mod sensors;
 mod sighting;
+mod steering;
 mod track;
+mod vehicle;
 
 use std::collections::BTreeMap;
 
 use pleiad_estimation::geometry::Vector3;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId, Timestamp};
+use pleiad_physics::ActiveEffect;
 use pleiad_recording::{Recording, RobotRecording};
 
 pub use connectivity::{Disconnection, connectivity};
@@ -43,6 +49,8 @@ pub struct SimulatedRun {
     pub priors: BTreeMap<RobotId, Prior>,
     /// Where each robot truly was, at any time.
     pub tracks: BTreeMap<RobotId, Track>,
+    /// What acted on each robot besides; no recording says it.
+    pub injected: BTreeMap<RobotId, Vec<ActiveEffect<f64>>>,
 }
 
 /// What a robot is told of its start: `pose = truth exp(n)` with independent components of `n`, the
@@ -84,25 +92,21 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<SimulatedRun, Error> {
     let drives = drive::drive(scenario, &starts, source);
     let tracks: BTreeMap<_, _> = drives.iter().map(|(robot, drive)| (*robot, drive.track.clone())).collect();
 
+    let until = Timestamp::from_seconds(scenario.duration_s);
     let mut robots = BTreeMap::new();
-    for (robot, drive) in drives {
-        let channels = sensors::Channels {
-            seed: source,
-            robot,
-            settings: &scenario.robots[&robot],
-            track: &drive.track,
-            until: Timestamp::from_seconds(scenario.duration_s),
-        };
-        let recorded = RobotRecording {
+    for (robot, drive) in &drives {
+        let channels = sensors::Channels::new(source, *robot, &scenario.robots[robot], drive, until);
+        let mut recorded = RobotRecording {
             odometry: channels.odometry(),
             gyro: channels.gyro(),
             gps: channels.gps(),
             heading: channels.heading(),
             sightings: sighting::sightings(&channels, &tracks, &landmarks),
-            truth: channels.truth(scenario.truth_rate_hz),
-            commands: drive.commands,
+            truth: channels.truth(scenario.truth_rate_hz, scenario.truth_sigma_m, scenario.truth_sigma_rad),
+            commands: channels.commands(),
         };
-        robots.insert(robot, recorded);
+        sort(&mut recorded);
+        robots.insert(*robot, recorded);
     }
     let recording = Recording {
         name: scenario.name.clone(),
@@ -110,7 +114,17 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<SimulatedRun, Error> {
         nominal: Some(nominal::nominal(scenario)),
         robots,
     };
-    Ok(SimulatedRun { seed, recording, priors: priors(scenario, &starts, source), tracks })
+    let injected = scenario.robots.iter().map(|(robot, own)| (*robot, own.effects.clone())).collect();
+    Ok(SimulatedRun { seed, recording, priors: priors(scenario, &starts, source), tracks, injected })
+}
+
+/// Brings every channel into the order of its stamps, which a clock that is set back loses.
+fn sort(recorded: &mut RobotRecording) {
+    let RobotRecording { commands, odometry, gyro, gps, heading, sightings, truth: _ } = recorded;
+    commands.sort_by_key(|command| command.time);
+    for channel in [odometry, gyro, gps, heading, sightings] {
+        channel.sort_by_key(|sample| sample.time);
+    }
 }
 
 fn priors(scenario: &Scenario, starts: &BTreeMap<RobotId, Pose2>, seed: Seed) -> BTreeMap<RobotId, Prior> {

@@ -1,4 +1,5 @@
-//! What the nominal simulation believes of a simulated team: the settings themselves.
+//! What the nominal simulation believes of a simulated team: the settings themselves, but for what they
+//! declare otherwise.
 
 use std::collections::BTreeMap;
 
@@ -20,6 +21,9 @@ pub(super) fn nominal(scenario: &Scenario) -> Nominal {
         heading_sigma_rad: greatest(|robot| robot.heading.rate_hz, |robot| robot.heading.sigma_rad),
         range_sigma_m: greatest(seeing, |robot| robot.relative.sigma_range_m),
         bearing_sigma_rad: greatest(seeing, |robot| robot.relative.sigma_bearing_rad),
+        truth_sigma_m: scenario.truth_sigma_m,
+        truth_sigma_rad: scenario.truth_sigma_rad,
+        command_jitter_s: greatest(|_| 1.0, |robot| robot.command_jitter_s),
         odometry_floor_pos_sigma_m_per_1s: greatest(|_| 1.0, |robot| one_second(robot)[0]),
         odometry_floor_heading_sigma_rad_per_1s: greatest(|_| 1.0, |robot| one_second(robot)[2]),
         ..NominalNoise::default()
@@ -64,15 +68,20 @@ fn nominal_robot(robot: &RobotSettings) -> NominalRobot {
         ]
         .map(|(key, rate_hz)| (key.to_owned(), rate_hz)),
     );
-    NominalRobot {
+    let mut nominal = NominalRobot {
         wheel_radius: robot.wheel_radius_m,
         track_width: robot.track_width_m,
         encoder_ticks_per_rev: f64::from(robot.encoder_ticks_per_rev),
         servo_time_constant_s: robot.servo_time_constant_s,
         servo_time_constant_turn_s: robot.servo_time_constant_turn_s,
+        // The mean of a delay that is uniform from zero.
+        command_latency_s: 0.5 * robot.command_jitter_s,
         gyro_bias_rad_s: robot.gyro.bias_rad_s,
         gyro_scale: 1.0,
         rates_hz,
+        drive: robot.drive.drive(),
         ..NominalRobot::default()
-    }
+    };
+    robot.declared.apply(&mut nominal);
+    nominal
 }

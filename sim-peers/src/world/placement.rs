@@ -7,7 +7,7 @@ use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 
 use super::Landmarks;
 use super::random::{Channel, Seed, between};
-use crate::scenario::RobotSettings;
+use crate::scenario::{Policy, RobotSettings};
 use crate::{Error, Scenario};
 
 /// Least distance between two starts that were not given, metres.
@@ -24,9 +24,9 @@ pub(super) fn starts(scenario: &Scenario, seed: Seed) -> Result<BTreeMap<RobotId
             starts.insert(*robot, Pose2::new(start.x_m, start.y_m, start.heading_rad));
         }
     }
-    for (robot, settings) in &scenario.robots {
+    for robot in scenario.robots.keys() {
         if !starts.contains_key(robot) {
-            let start = free_place(scenario, *robot, settings, seed, &starts)?;
+            let start = free_place(scenario, *robot, seed, &starts)?;
             starts.insert(*robot, start);
         }
     }
@@ -36,11 +36,10 @@ pub(super) fn starts(scenario: &Scenario, seed: Seed) -> Result<BTreeMap<RobotId
 fn free_place(
     scenario: &Scenario,
     robot: RobotId,
-    settings: &RobotSettings,
     seed: Seed,
     taken: &BTreeMap<RobotId, Pose2>,
 ) -> Result<Pose2, Error> {
-    let [x_min, x_max, y_min, y_max] = wander_area(scenario, settings);
+    let [x_min, x_max, y_min, y_max] = wander_area(scenario, robot);
     let mut stream = seed.stream(robot, Channel::Placement);
     for _ in 0..ATTEMPTS {
         let place = Pose2::new(
@@ -71,9 +70,38 @@ pub(super) fn landmarks(scenario: &Scenario, seed: Seed) -> Landmarks {
 
 /// Where a robot's random waypoints lie: its area, or the arena, less a margin to turn in (at most a
 /// tenth of the extent).
-pub(super) fn wander_area(scenario: &Scenario, settings: &RobotSettings) -> [f64; 4] {
-    let [x_min, x_max, y_min, y_max] = settings.motion.area_m.unwrap_or_else(|| scenario.arena.bounds_m());
+pub(super) fn wander_area(scenario: &Scenario, robot: RobotId) -> [f64; 4] {
+    let [x_min, x_max, y_min, y_max] = own_area(scenario, robot);
     let margin = |extent: f64| (0.1 * extent).min(1.0);
     let (x_margin, y_margin) = (margin(x_max - x_min), margin(y_max - y_min));
     [x_min + x_margin, x_max - x_margin, y_min + y_margin, y_max - y_margin]
+}
+
+/// The area that a robot is given; without one the arena, which robots under `manoeuvres` share out in
+/// squares or nearly so.
+pub(super) fn own_area(scenario: &Scenario, robot: RobotId) -> [f64; 4] {
+    let motion = &scenario.robots[&robot].motion;
+    let arena = scenario.arena.bounds_m();
+    match motion.area_m {
+        Some(area_m) => area_m,
+        None if motion.policy == Policy::Manoeuvres => share(scenario, robot, arena),
+        None => arena,
+    }
+}
+
+fn share(scenario: &Scenario, robot: RobotId, [x_min, x_max, y_min, y_max]: [f64; 4]) -> [f64; 4] {
+    let shares = |settings: &RobotSettings| {
+        settings.motion.policy == Policy::Manoeuvres && settings.motion.area_m.is_none()
+    };
+    let sharing: Vec<RobotId> =
+        scenario.robots.iter().filter(|(_, settings)| shares(settings)).map(|(robot, _)| *robot).collect();
+    let count = sharing.len().max(1) as f64;
+    let (width_m, height_m) = (x_max - x_min, y_max - y_min);
+    let columns = (count * width_m / height_m).sqrt().round().clamp(1.0, count);
+    let rows = (count / columns).ceil();
+    let rank = sharing.iter().position(|other| *other == robot).unwrap_or(0) as f64;
+    let (column, row) = (rank % columns, (rank / columns).floor());
+    let (width_m, height_m) = (width_m / columns, height_m / rows);
+    let (left, bottom) = (x_min + column * width_m, y_min + row * height_m);
+    [left, left + width_m, bottom, bottom + height_m]
 }

@@ -3,9 +3,10 @@
 //! sensor takes nothing from the others' streams.
 
 use pleiad_estimation::RobotId;
+use pleiad_physics::Chance;
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use rand_distr::{ChiSquared, Distribution, StandardNormal, StandardUniform};
 
 /// The seed of a run.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +25,16 @@ pub(super) enum Channel {
     Gps = 8,
     Heading = 9,
     Relative = 10,
+    Commands = 11,
+    Truth = 12,
+    /// The spread of heavy-tailed sightings.
+    Tails = 13,
+    /// Draws of effects of chance in sightings.
+    Chances = 14,
+    /// Draws of effects of chance in the gyro.
+    GyroChances = 15,
+    /// When a robot's commands take effect.
+    Jitter = 16,
 }
 
 /// Ends every key, so that no other use of a bare seed shares a stream with the world.
@@ -51,6 +62,19 @@ impl Seed {
     /// Where in its period a channel samples, as a share of the period in `[0, 1)`.
     pub(super) fn phase(self, robot: RobotId, channel: Channel) -> f64 {
         uniform(&mut self.item_stream(robot, channel, PHASE_ITEM))
+    }
+}
+
+/// Three draws for the effects of chance.
+pub(super) fn chance(stream: &mut ChaCha12Rng) -> Chance {
+    Chance { uniform: uniform(stream), choice: uniform(stream), normal: normal(stream) }
+}
+
+/// A standard normal variate divided by this has Student's distribution of so many degrees of freedom.
+pub(super) fn student_divisor(stream: &mut ChaCha12Rng, degrees_of_freedom: f64) -> f64 {
+    match ChiSquared::new(degrees_of_freedom) {
+        Ok(spread) if degrees_of_freedom.is_finite() => (spread.sample(stream) / degrees_of_freedom).sqrt(),
+        _ => 1.0,
     }
 }
 

@@ -1,15 +1,20 @@
 //! A robot's sensors of itself: odometry, gyro, GPS, heading, and the ground truth beside them.
+//!
+//! A reading is taken at an instant of common time, of the true path as far back as the sensor is late, and
+//! stamped by the robot's clock. Effects act by the hooks of the signal chain.
 
-use std::f64::consts::TAU;
-
-use pleiad_estimation::geometry::wrap_angle;
+use pleiad_estimation::geometry::{Vector3, wrap_angle};
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
-use pleiad_recording::TruthSample;
+use pleiad_physics::chain::sensors;
+use pleiad_physics::{Context, RobotModel};
+use pleiad_recording::{Command, TruthSample};
 
 use super::OBSERVATIONS_FROM_S;
-use super::random::{Channel, Seed, normal};
-use super::track::Track;
+use super::drive::Drive;
+use super::model::{Firmware, true_model};
+use super::random::{Channel, Seed, chance, normal};
+use super::track::{Track, wrapped};
 use crate::scenario::{OdometryKind, RobotSettings};
 
 /// The channels of one robot, to be sampled from its true path.
@@ -17,77 +22,117 @@ pub(super) struct Channels<'a> {
     pub(super) seed: Seed,
     pub(super) robot: RobotId,
     pub(super) settings: &'a RobotSettings,
-    pub(super) track: &'a Track,
-    /// The last stamp allowed to anything but odometry.
-    pub(super) until: Timestamp,
+    pub(super) model: RobotModel<f64>,
+    drive: &'a Drive,
+    /// The last instant of anything but odometry.
+    until: Timestamp,
 }
 
-impl Channels<'_> {
-    /// The stamps of a channel: from `from_s` plus its own phase to the end of the run; none at rate 0.
-    pub(super) fn stamps(
+impl<'a> Channels<'a> {
+    pub(super) fn new(
+        seed: Seed,
+        robot: RobotId,
+        settings: &'a RobotSettings,
+        drive: &'a Drive,
+        until: Timestamp,
+    ) -> Self {
+        Self { seed, robot, settings, model: true_model(settings), drive, until }
+    }
+
+    pub(super) fn track(&self) -> &'a Track {
+        &self.drive.track
+    }
+
+    /// The instants of a channel: from `from_s` plus its own phase to the end of the run; none at rate 0.
+    pub(super) fn instants(
         &self,
         channel: Channel,
         rate_hz: f64,
         from_s: f64,
     ) -> impl Iterator<Item = Timestamp> {
         let phase = self.seed.phase(self.robot, channel);
-        stamps(from_s, phase, rate_hz, self.until)
+        instants(from_s, phase, rate_hz, self.until)
     }
 
-    /// Odometry at every tick, in the form asked for. It reports what the wheels did, exactly; the last
-    /// velocity, which nothing follows, repeats the one before.
+    /// What the hooks of effects look at: the true motion at an instant.
+    pub(super) fn context(&self, time: Timestamp) -> Context<'_, f64> {
+        Context::new(&self.model.nominal, time.seconds(), self.track().motion_at(time))
+    }
+
+    /// The stamp that the robot's clock gives to an instant.
+    pub(super) fn stamp(&self, time: Timestamp) -> Timestamp {
+        time.plus_seconds(sensors::clock_error_s(&self.model, &self.context(time)))
+    }
+
+    /// The commands as the firmware received them.
+    pub(super) fn commands(&self) -> Vec<Command> {
+        let stamped = |command: &Command| Command { time: self.stamp(command.time), ..*command };
+        self.drive.commands.iter().map(stamped).collect()
+    }
+
+    /// Odometry at every tick, in the form asked for, from the encoders as they are read. The last velocity,
+    /// which nothing follows, repeats the one before.
     pub(super) fn odometry(&self) -> Vec<Sample> {
-        let steps = self.track.steps();
-        let times = steps.iter().map(|step| step.time).chain([self.track.end()]);
-        match self.settings.odometry.kind {
-            OdometryKind::Velocity => times
-                .zip(steps.iter().chain(steps.last()))
-                .map(|(time, step)| Sample {
-                    time,
-                    reading: Reading::Velocity {
-                        forward_m_s: step.forward_m_s,
-                        yaw_rate_rad_s: step.yaw_rate_rad_s,
-                    },
-                })
-                .collect(),
+        let firmware = Firmware::of(self.settings);
+        let ticks: Vec<Timestamp> = self.track().ticks().collect();
+        let angles: Vec<[f64; 2]> = ticks
+            .iter()
+            .zip(&self.drive.wheel_angles)
+            .map(|(time, angles)| self.encoders(*time, *angles))
+            .collect();
+        let moved = |tick: usize| {
+            let turned = [0, 1].map(|wheel| angles[tick + 1][wheel] - angles[tick][wheel]);
+            firmware.moved(turned, self.drive.steer_rad[tick + 1])
+        };
+        let reading = |tick: usize| match self.settings.odometry.kind {
             OdometryKind::Wheels => {
-                let angles =
-                    std::iter::once([0.0; 2]).chain(self.wheel_turns().scan([0.0; 2], |sum, turn| {
-                        *sum = [sum[0] + turn[0], sum[1] + turn[1]];
-                        Some(*sum)
-                    }));
-                times
-                    .zip(angles)
-                    .map(|(time, angles)| {
-                        let [left_rad, right_rad] = angles.map(|angle| self.count(angle));
-                        Sample { time, reading: Reading::Wheels { left_rad, right_rad } }
-                    })
-                    .collect()
+                let [left_rad, right_rad] = angles[tick];
+                Reading::Wheels { left_rad, right_rad }
+            }
+            OdometryKind::Velocity => {
+                let tick = tick.min(ticks.len() - 2);
+                let (forward_m, turn_rad) = moved(tick);
+                let duration_s = ticks[tick + 1].seconds_since(ticks[tick]);
+                let (forward_m_s, yaw_rate_rad_s) = (forward_m / duration_s, turn_rad / duration_s);
+                Reading::Velocity { forward_m_s, yaw_rate_rad_s }
             }
             OdometryKind::Increment => {
-                let increments = self.ticks().map(|(step, dt_s)| step.wheels(dt_s));
-                times
-                    .zip(std::iter::once(Pose2::identity()).chain(increments))
-                    .map(|(time, increment)| Sample { time, reading: Reading::Increment(increment) })
-                    .collect()
+                Reading::Increment(tick.checked_sub(1).map_or(Pose2::identity(), |before| {
+                    let (forward_m, turn_rad) = moved(before);
+                    Pose2::exp(Vector3::new(forward_m, 0.0, turn_rad))
+                }))
             }
-        }
+        };
+        ticks
+            .iter()
+            .enumerate()
+            .map(|(tick, time)| Sample { time: self.stamp(*time), reading: reading(tick) })
+            .collect()
     }
 
-    /// Yaw rate of the body, the mean over one sampling period centred on the stamp. The gyro turns with
+    /// Wheel angles as the encoders read them.
+    fn encoders(&self, time: Timestamp, angles: [f64; 2]) -> [f64; 2] {
+        let mut context = self.context(time);
+        context.motion.wheel_angle_rad = angles;
+        sensors::encoders(&self.model, &context)
+    }
+
+    /// Yaw rate of the body, the mean over one sampling period centred on the instant. The gyro turns with
     /// the body: it sees the slip that the wheels do not.
     pub(super) fn gyro(&self) -> Vec<Sample> {
         let gyro = &self.settings.gyro;
         let mut stream = self.seed.stream(self.robot, Channel::Gyro);
-        self.stamps(Channel::Gyro, gyro.rate_hz, OBSERVATIONS_FROM_S)
+        let mut chances = self.seed.stream(self.robot, Channel::GyroChances);
+        let mut walk_rad_s = 0.0;
+        self.instants(Channel::Gyro, gyro.rate_hz, OBSERVATIONS_FROM_S)
             .map(|time| {
-                let half_s = 0.5 / gyro.rate_hz;
-                let (before, after) = (time.plus_seconds(-half_s), time.plus_seconds(half_s));
-                let turned =
-                    wrap_angle(self.track.pose_at(after).yaw_rad() - self.track.pose_at(before).yaw_rad());
-                let rate = turned / after.seconds_since(before);
-                let yaw_rate_rad_s = rate + gyro.bias_rad_s + gyro.sigma_rad_s * normal(&mut stream);
-                Sample { time, reading: Reading::Gyro { yaw_rate_rad_s } }
+                let mut context = self.context(time).over(1.0 / gyro.rate_hz);
+                context.motion.yaw_rate_rad_s = self.track().mean_velocity(time, 0.5 / gyro.rate_hz)[2];
+                context.chance = chance(&mut chances);
+                let rate = sensors::gyro(&self.model, &context, &mut walk_rad_s);
+                let sigma = sensors::noise(&self.model, &context, 0.0, 0.0).gyro_sigma_rad_s;
+                let yaw_rate_rad_s = rate + sigma * normal(&mut stream);
+                Sample { time: self.stamp(time), reading: Reading::Gyro { yaw_rate_rad_s } }
             })
             .collect()
     }
@@ -101,14 +146,15 @@ impl Channels<'_> {
             let within = |window: &[f64; 2]| (window[0]..window[1]).contains(&time.seconds());
             gps.windows_s.is_empty() || gps.windows_s.iter().any(within)
         };
-        self.stamps(Channel::Gps, gps.rate_hz, OBSERVATIONS_FROM_S)
-            .map(|time| {
-                let position = self.track.pose_at(time).position();
-                let x_m = position.x + gps.sigma_m * normal(&mut stream);
-                let y_m = position.y + gps.sigma_m * normal(&mut stream);
-                Sample { time, reading: Reading::Gps { x_m, y_m } }
+        self.instants(Channel::Gps, gps.rate_hz, OBSERVATIONS_FROM_S)
+            .filter_map(|time| {
+                let noise = [(); 2].map(|()| gps.sigma_m * normal(&mut stream));
+                let how = sensors::gps_reading(&self.model, &self.context(time));
+                let pose = self.track().unwrapped_at(time.plus_seconds(-how.latency_s));
+                let [x, y] = sensors::antenna(&how, &pose);
+                let reading = Reading::Gps { x_m: x + noise[0], y_m: y + noise[1] };
+                received(time).then(|| Sample { time: self.stamp(time), reading })
             })
-            .filter(|sample| received(sample.time))
             .collect()
     }
 
@@ -116,51 +162,36 @@ impl Channels<'_> {
     pub(super) fn heading(&self) -> Vec<Sample> {
         let heading = &self.settings.heading;
         let mut stream = self.seed.stream(self.robot, Channel::Heading);
-        self.stamps(Channel::Heading, heading.rate_hz, OBSERVATIONS_FROM_S)
+        self.instants(Channel::Heading, heading.rate_hz, OBSERVATIONS_FROM_S)
             .map(|time| {
                 let noise = heading.sigma_rad * normal(&mut stream);
-                let heading_rad = wrap_angle(self.track.pose_at(time).yaw_rad() + noise);
-                Sample { time, reading: Reading::Heading { heading_rad } }
+                let context = self.context(time);
+                let read = sensors::heading_of(&self.model, &context, context.heading_rad());
+                let reading = Reading::Heading { heading_rad: wrap_angle(read + noise) };
+                Sample { time: self.stamp(time), reading }
             })
             .collect()
     }
 
-    /// Ground truth without error, at the same instants for every robot.
-    pub(super) fn truth(&self, rate_hz: f64) -> Vec<TruthSample> {
-        stamps(0.0, 0.0, rate_hz, self.until)
-            .map(|time| TruthSample { time, pose: self.track.pose_at(time) })
+    /// Ground truth, at the same instants for every robot and stamped by the clock of common time.
+    pub(super) fn truth(&self, rate_hz: f64, sigma_m: f64, sigma_rad: f64) -> Vec<TruthSample> {
+        let mut stream = self.seed.stream(self.robot, Channel::Truth);
+        instants(0.0, 0.0, rate_hz, self.until)
+            .map(|time| {
+                let how = sensors::truth_reading(&self.model, &self.context(time));
+                let pose = self.track().unwrapped_at(time.plus_seconds(-how.latency_s));
+                let mut seen = pose.compose(&sensors::marker(&how));
+                seen.x_m += sigma_m * normal(&mut stream);
+                seen.y_m += sigma_m * normal(&mut stream);
+                seen.yaw_rad += sigma_rad * normal(&mut stream);
+                TruthSample { time, pose: wrapped(seen) }
+            })
             .collect()
-    }
-
-    /// Each step with its length in seconds.
-    fn ticks(&self) -> impl Iterator<Item = (&super::track::Step, f64)> {
-        let steps = self.track.steps();
-        let ends = steps.iter().skip(1).map(|step| step.time).chain([self.track.end()]);
-        steps.iter().zip(ends).map(|(step, end)| (step, end.seconds_since(step.time)))
-    }
-
-    /// How far the left and right wheel turned in each tick, radians.
-    fn wheel_turns(&self) -> impl Iterator<Item = [f64; 2]> {
-        let (radius_m, half_track_m) = (self.settings.wheel_radius_m, 0.5 * self.settings.track_width_m);
-        self.ticks().map(move |(step, dt_s)| {
-            let across = step.yaw_rate_rad_s * half_track_m;
-            [step.forward_m_s - across, step.forward_m_s + across].map(|rim_m_s| rim_m_s * dt_s / radius_m)
-        })
-    }
-
-    /// An angle as the encoder counts it.
-    fn count(&self, angle_rad: f64) -> f64 {
-        let ticks_per_rev = self.settings.encoder_ticks_per_rev;
-        if ticks_per_rev == 0 {
-            return angle_rad;
-        }
-        let tick_rad = TAU / f64::from(ticks_per_rev);
-        (angle_rad / tick_rad).floor() * tick_rad
     }
 }
 
-/// Stamps at `from_s + (phase + k) / rate_hz` up to and with `until`.
-fn stamps(from_s: f64, phase: f64, rate_hz: f64, until: Timestamp) -> impl Iterator<Item = Timestamp> {
+/// Instants at `from_s + (phase + k) / rate_hz` up to and with `until`.
+fn instants(from_s: f64, phase: f64, rate_hz: f64, until: Timestamp) -> impl Iterator<Item = Timestamp> {
     let count = if rate_hz > 0.0 { u32::MAX } else { 0 };
     (0..count)
         .map(move |k| Timestamp::from_seconds(from_s + (phase + f64::from(k)) / rate_hz))

@@ -1,7 +1,10 @@
 //! Rules of motion: from where a robot is to a velocity command. Robots are steered by the true pose, as
 //! by somebody who watches them, so that they stay in their area however far their own estimate drifts.
 
+mod manoeuvres;
+mod programme;
 mod route;
+mod script;
 mod wander;
 
 use std::f64::consts::PI;
@@ -11,8 +14,12 @@ use rand_chacha::ChaCha12Rng;
 
 use crate::Scenario;
 use crate::scenario::{Direction, Motion, Policy};
+use manoeuvres::Manoeuvres;
 use route::Route;
+use script::Script;
 use wander::Wander;
+
+use super::vehicle::Neighbour;
 
 /// Yaw rate commanded per radian of heading error, 1/s.
 const STEERING_GAIN_HZ: f64 = 2.0;
@@ -30,7 +37,7 @@ pub(super) struct View<'a> {
     pub(super) time_s: f64,
     pub(super) pose: Pose2,
     /// Every robot, this one included, at its last tick.
-    pub(super) poses: &'a [(RobotId, Pose2)],
+    pub(super) team: &'a [Neighbour],
 }
 
 /// One robot's rule at work.
@@ -45,6 +52,8 @@ enum Rule {
     FigureEight,
     Route(Route),
     Wander(Wander),
+    Manoeuvres(Manoeuvres),
+    Script(Script),
     /// Wanders while it is its turn.
     InTurn {
         wander: Wander,
@@ -55,7 +64,7 @@ enum Rule {
 
 impl Driver {
     pub(super) fn new(scenario: &Scenario, robot: RobotId, start: Pose2, stream: ChaCha12Rng) -> Self {
-        let motion = scenario.robots[&robot].motion;
+        let motion = scenario.robots[&robot].motion.clone();
         let wander = |stream| Wander::new(scenario, robot, start, stream);
         let rule = match motion.policy {
             Policy::Parked => Rule::Parked,
@@ -64,6 +73,8 @@ impl Driver {
             Policy::Square => Rule::Route(Route::square(&start, motion.side_m, sense(&motion))),
             Policy::LineBackAndForth => Rule::Route(Route::line(&start, motion.side_m)),
             Policy::WaypointsRandom => Rule::Wander(wander(stream)),
+            Policy::Manoeuvres => Rule::Manoeuvres(Manoeuvres::new(scenario, robot, stream)),
+            Policy::Script => Rule::Script(Script::new(&motion.script)),
             Policy::PortableLandmarks => {
                 let (rank, _) = rank(scenario, robot);
                 Rule::InTurn { wander: wander(stream), turn: rank % 2, turns: 2 }
@@ -88,6 +99,8 @@ impl Driver {
             }
             Rule::Route(route) => route.command(motion, view),
             Rule::Wander(wander) => wander.command(view),
+            Rule::Manoeuvres(manoeuvres) => manoeuvres.command(motion, view),
+            Rule::Script(script) => script.next(view.time_s).unwrap_or_default(),
             Rule::InTurn { wander, turn, turns } => {
                 let now = (view.time_s / motion.move_s).floor() % f64::from(*turns);
                 if (now - f64::from(*turn)).abs() < 0.5 { wander.command(view) } else { Twist::default() }

@@ -41,9 +41,9 @@ struct Leg {
 impl Wander {
     pub(super) fn new(scenario: &Scenario, robot: RobotId, start: Pose2, mut stream: ChaCha12Rng) -> Self {
         let settings = &scenario.robots[&robot];
-        let area_m = wander_area(scenario, settings);
+        let area_m = wander_area(scenario, robot);
         let leg = leg(&settings.motion, area_m, start.position(), 0.0, &mut stream);
-        Self { motion: settings.motion, area_m, stream, leg }
+        Self { motion: settings.motion.clone(), area_m, stream, leg }
     }
 
     pub(super) fn command(&mut self, view: &View<'_>) -> Twist {
@@ -56,8 +56,8 @@ impl Wander {
         let mut clearance = 1.0_f64;
         let keep_m = self.motion.keep_away_m;
         if keep_m > 0.0 {
-            for (_, other) in view.poses.iter().filter(|(robot, _)| *robot != view.robot) {
-                let away = here - other.position();
+            for other in view.team.iter().filter(|other| other.robot != view.robot) {
+                let away = here - other.pose.position();
                 let distance_m = away.norm();
                 let closeness = (keep_m + CAUTION_M - distance_m) / CAUTION_M;
                 if closeness <= 0.0 || distance_m <= 0.0 {
