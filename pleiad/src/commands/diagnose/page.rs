@@ -109,6 +109,7 @@ fn found(finding: &Finding) -> Found {
         robots: finding.robots.iter().map(|robot| RobotId(*robot)).collect(),
         stage: finding.stage.clone(),
         channel: channel_words(&finding.channel),
+        effect: finding.effect.clone(),
         title: name.map_or("something unnamed", title).to_owned(),
         sentences: sentences(finding),
         parameters: finding
