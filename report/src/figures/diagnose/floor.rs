@@ -127,7 +127,7 @@ pub(crate) fn gain_floor(report: &DiagnoseReport, finding: &Found, evidence: &[&
         let name = format!("path of robot {robot}");
         if !kept.is_empty() {
             figure = figure.trace(
-                Trace::path(&name, &pick(&x), &pick(&y), Colour::Muted).width(0.75).opacity(0.6).unlisted(),
+                Trace::path(&name, &pick(&x), &pick(&y), Colour::Muted).width(0.5).opacity(0.3).unlisted(),
             );
         }
     }
