@@ -232,3 +232,41 @@ fn component(channel: Channel, position: usize) -> (String, String) {
     let suffix = format!("_{}", own.unit.replace('/', "_"));
     (own.name.trim_end_matches(&suffix).replace('_', " "), own.unit.to_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use pleiad_mismatch::Plots;
+    use pleiad_recording::RobotRecording;
+    use pleiad_report::{diagnose_report, summary_text};
+
+    use super::super::fixture;
+    use super::*;
+
+    fn recording() -> Recording {
+        let robots = [1, 2].map(|robot| (RobotId(robot), RobotRecording::default()));
+        Recording { name: "square".into(), robots: robots.into(), ..Recording::default() }
+    }
+
+    #[test]
+    fn a_diagnosis_becomes_a_page_with_its_findings_where_they_belong() {
+        let diagnosis =
+            Diagnosis { findings: fixture::findings(), plots: Plots::default(), corrected: [].into() };
+        let report = report(&diagnosis, &[recording()], &[("square".to_owned(), PathBuf::from("square"))]);
+        assert_eq!(report.findings[0].title, "unequal wheel diameters");
+        assert!(report.findings[0].rivals.is_empty(), "an effect is no rival of itself");
+        assert_eq!(report.findings[1].rivals, ["actuator lag (first order)"]);
+        // Tested with a sensor effect on robot 1 only; an effect of the body that no robot can show.
+        let stages: Vec<_> =
+            report.tested.iter().map(|test| (test.robot.0, &*test.stage, test.testable)).collect();
+        assert_eq!(stages, [(1, "sensor", true), (1, "body", false), (2, "body", false)]);
+        let html = diagnose_report(&report).unwrap().render();
+        assert!(html.contains("cannot tell transport delay from actuator lag (first order)"));
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_is_null_in_json() {
+        let text = summary_text(&fixture::findings()).unwrap();
+        assert!(text.contains("\"minimum_detectable\": null"), "{text}");
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+    }
+}
