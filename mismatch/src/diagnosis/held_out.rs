@@ -98,14 +98,17 @@ pub(crate) fn compared(units: &[&Unit<'_>], with: &[State], without: &[State]) -
 /// Adds the gain of each element to its block.
 fn add(unit: &Unit<'_>, with: &State, without: &State, blocks: &mut [f64], held: &dyn Fn(usize) -> bool) {
     for index in (0..unit.rows.len()).filter(|&index| held(index)) {
-        blocks[unit.block_of[index]] += log_score(with, index) - log_score(without, index);
+        blocks[unit.block_of[index]] += gain(with, without, index);
     }
 }
 
-/// Log-density of a residual, bounded in its slope, but for a constant.
-pub(crate) fn log_score(state: &State, index: usize) -> f64 {
-    let sigma = state.noise.sigma[index];
-    -0.5 * noise::rho(state.residuals[index] / sigma) - sigma.ln()
+/// Log-density that an element gains by the better model, both at the noise of the better one: a model gains
+/// by what it predicts, not by claiming less noise where errors are small and more where they are not. What
+/// is farther off than [`noise::CLIP`] sigmas counts as that far, so that no instant outweighs the rest.
+pub(crate) fn gain(with: &State, without: &State, index: usize) -> f64 {
+    let sigma = with.noise.sigma[index];
+    let square = |state: &State| (state.residuals[index] / sigma).abs().min(noise::CLIP).powi(2);
+    0.5 * (square(without) - square(with))
 }
 
 /// Sum over blocks; its variance with the covariance of neighbours (`newey1987`, one lag).

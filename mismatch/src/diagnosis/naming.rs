@@ -10,7 +10,7 @@ use crate::channel::Channel;
 use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::entries::composition;
 use crate::diagnosis::fit::Fit;
-use crate::diagnosis::held_out::{Gain, log_score};
+use crate::diagnosis::held_out::{self, Gain};
 use crate::diagnosis::select::{FAMILYWISE, wald};
 use crate::diagnosis::starts::Placing;
 use crate::diagnosis::support::Support;
@@ -227,7 +227,7 @@ fn place(units: &[&Unit<'_>], support: &Support, term: &Term) -> Place {
     for (index, unit) in units.iter().enumerate() {
         let (with, without) = (&support.with.states[index], &support.without.states[index]);
         for (row, meaning) in unit.rows.iter().enumerate() {
-            let gain = log_score(with, row) - log_score(without, row);
+            let gain = held_out::gain(with, without, row);
             total += gain;
             count += 1;
             for ((_, holds), (sum, number)) in REGIMES.iter().zip(gains.iter_mut().zip(&mut counts)) {

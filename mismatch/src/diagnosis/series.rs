@@ -1,7 +1,7 @@
 //! Series to plot.
 
 use crate::diagnosis::fit::{Fit, residuals};
-use crate::diagnosis::held_out::log_score;
+use crate::diagnosis::held_out;
 use crate::diagnosis::run::{Judgement, Prepared};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::Unit;
@@ -96,7 +96,7 @@ fn gain(
     let mut all: Vec<[f64; 2]> = Vec::new();
     let mut sum = 0.0;
     for index in order {
-        sum += log_score(with, index) - log_score(without, index);
+        sum += held_out::gain(with, without, index);
         let time_s = unit.rows[index].time_s;
         match all.last_mut() {
             Some(last) if time_s - last[0] < GAIN_STEP_S => last[1] = sum,
