@@ -64,6 +64,16 @@ pub(crate) fn states(units: &[&Unit<'_>], terms: &[Term]) -> Option<Vec<State>> 
     units.iter().map(state).collect()
 }
 
+/// The states of units to whose terms one is added.
+pub(crate) fn with_another(units: &[&Unit<'_>], known: &[State], terms: &[Term]) -> Option<Vec<State>> {
+    let added = terms.last()?.effect;
+    let state = |(unit, state): (&&Unit<'_>, &State)| {
+        let residuals = residuals(unit, terms, &|channel| touches(added, channel), Some(&state.residuals))?;
+        Some(State { noise: noise::estimate(unit, &residuals), residuals })
+    };
+    units.iter().zip(known).map(state).collect()
+}
+
 /// Residuals of a unit; those of channels that are not asked for are taken from `known`.
 pub(crate) fn residuals(
     unit: &Unit<'_>,
@@ -92,8 +102,19 @@ pub(crate) fn fit(
     movable: &dyn Fn(usize) -> bool,
     effort: Effort,
 ) -> Option<Fit> {
-    let mut terms = terms;
-    let mut states = states(units, &terms)?;
+    let states = states(units, &terms)?;
+    fit_from(units, terms, states, movable, effort)
+}
+
+/// The same from what the units look like under the terms.
+pub(crate) fn fit_from(
+    units: &[&Unit<'_>],
+    terms: Vec<Term>,
+    states: Vec<State>,
+    movable: &dyn Fn(usize) -> bool,
+    effort: Effort,
+) -> Option<Fit> {
+    let (mut terms, mut states) = (terms, states);
     let mut slots = free_slots(&terms, movable);
     let mut found = all_columns(units, &terms, &slots);
     // What shows nowhere cannot be fitted.
