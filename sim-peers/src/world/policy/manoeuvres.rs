@@ -65,10 +65,12 @@ impl Manoeuvres {
         let motion = &settings.motion;
         let [x_min, x_max, y_min, y_max] = own_area(scenario, robot);
         let smaller_m = (x_max - x_min).min(y_max - y_min);
-        let margin_m = (MARGIN_SHARE * smaller_m).min(MARGIN_M);
         let drive = &settings.drive;
         let tightest_m =
             (drive.kind == DriveKind::CarLike).then(|| drive.wheelbase_m / drive.max_steer_rad.tan());
+        // A car that is called back turns round first.
+        let turning_m = tightest_m.map_or(0.0, |radius_m| (2.0 * radius_m).min(0.25 * smaller_m));
+        let margin_m = (MARGIN_SHARE * smaller_m).min(MARGIN_M) + turning_m;
         let limits = Limits {
             speed_m_s: motion.speed_m_s,
             yaw_rate_rad_s: motion.max_yaw_rate_rad_s,
