@@ -208,7 +208,7 @@ impl AgentConfig {
         positive("bus.status_period_s", self.bus.status_period_s)?;
         not_negative("output.fsync_period_s", self.output.fsync_period_s)?;
         self.sensors.check()?;
-        let correction = self.correction(&mut Vec::new())?;
+        let correction = self.correction()?;
         let mut sensors = self.sensors.clone();
         let mut model = motion.checked()?;
         if correction.is_some() {

@@ -99,6 +99,9 @@ pub async fn run<B: Bus + Clone>(
     let node_config = config.node()?;
     let team = config.team()?;
     let robot = node_config.robot;
+    for remark in node_config.correction.iter().flat_map(|correction| &correction.remarks) {
+        tracing::warn!(robot = robot.0, %remark, "model");
+    }
     let folder = config.output.directory.clone();
     let (journal, records) = open_journal(folder.as_ref())?;
     let fresh = records.is_empty();

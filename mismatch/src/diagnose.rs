@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use pleiad_recording::Recording;
 
+use crate::diagnosis;
 use crate::error::MismatchError;
-use crate::findings::{Findings, Verdict};
+use crate::findings::Findings;
 use crate::view::Plots;
 
 /// What a diagnosis gives.
@@ -32,7 +33,7 @@ pub enum TruthUse {
 /// How to diagnose.
 #[derive(Clone, Debug, Default)]
 pub struct DiagnoseOptions {
-    /// Names of the recordings to fit on; all if empty.
+    /// Names of the recordings to fit on; all that are not tested on if empty.
     pub fit_on: Vec<String>,
     /// Names of the recordings to test on; parts left out of the fit if empty.
     pub test_on: Vec<String>,
@@ -43,25 +44,8 @@ pub struct DiagnoseOptions {
 /// Compares, locates, names, models.
 ///
 /// # Errors
-/// A recording that cannot be compared at all.
+/// There is no recording to fit on; a recording has no nominal model, or one that lacks a robot; ground truth
+/// is not to be used.
 pub fn diagnose(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Diagnosis, MismatchError> {
-    let mut corrected = BTreeMap::new();
-    for recording in recordings {
-        let Some(nominal) = &recording.nominal else {
-            return Err(MismatchError::NoNominal { recording: recording.name.clone() });
-        };
-        corrected.insert(recording.name.clone(), nominal.clone());
-    }
-    let findings = Findings {
-        verdict: Verdict::Untestable,
-        recordings: recordings.iter().map(|recording| recording.name.clone()).collect(),
-        fit_on: options.fit_on.clone(),
-        test_on: options.test_on.clone(),
-        findings: Vec::new(),
-        undetected: Vec::new(),
-        untestable: Vec::new(),
-        roll_outs: Vec::new(),
-        notes: Vec::new(),
-    };
-    Ok(Diagnosis { findings, plots: Plots::default(), corrected })
+    diagnosis::run(recordings, options)
 }

@@ -22,4 +22,21 @@ pub enum MismatchError {
         /// The robot that is not described.
         robot: RobotId,
     },
+    /// Nothing is left to fit on.
+    #[error("no recording to fit on: {names} {verb} all tested on; name fewer to test on, or one more recording", names = tested_on.join(", "), verb = if tested_on.len() == 1 { "is" } else { "are" })]
+    NothingToFit {
+        /// Those that are tested on.
+        tested_on: Vec<String>,
+    },
+    /// A name that no recording has.
+    #[error("there is no recording `{name}` among those given ({})", given.join(", "))]
+    UnknownRecording {
+        /// The name.
+        name: String,
+        /// The names there are.
+        given: Vec<String>,
+    },
+    /// Diagnosis without ground truth is not there.
+    #[error("diagnosis without ground truth is not built yet: use truth where it was recorded")]
+    WithoutTruth,
 }

@@ -37,7 +37,6 @@ pub use builtin::models;
 pub use channel::{Channel, Component, MAX_COMPONENTS};
 pub use compare::{ChannelComparison, RobotComparison, compare, end_to_end, residuals, residuals_of};
 pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, diagnose};
-pub use diagnosis::probe;
 pub use error::MismatchError;
 pub use evidence::Evidence;
 pub use findings::{

@@ -7,7 +7,7 @@ mod common;
 use common::commanded::{Departure, driven, joystick, with_sightings, without};
 use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_mismatch::{
-    Channel, ChannelResiduals, Evidence, MismatchError, Omission, compare, Residual, models, residuals_of,
+    Channel, ChannelResiduals, Evidence, MismatchError, Omission, Residual, compare, models, residuals_of,
 };
 use pleiad_physics::{ActiveEffect, Effect, RobotModel, Variable};
 use pleiad_recording::Recording;

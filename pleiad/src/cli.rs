@@ -126,6 +126,10 @@ pub struct ReplayArgs {
     /// agent's configuration. Default: noise.toml in the recording, or what is built in for its form.
     #[arg(long)]
     pub noise: Option<PathBuf>,
+    /// A model of the robots, such as a corrected.toml: its effects are taken out of what they read.
+    /// Default: model.toml in the recording, if it is there.
+    #[arg(long)]
+    pub model: Option<PathBuf>,
     /// Leave out rows that cannot be read; they are counted and reported.
     #[arg(long)]
     pub skip_bad_rows: bool,
@@ -166,6 +170,9 @@ pub struct SimulateArgs {
     /// The recording to predict, a folder with nominal.toml in it.
     #[arg(long, value_name = "RECORDING")]
     pub from: Option<PathBuf>,
+    /// Another model of the robots, such as a corrected.toml, in place of the recording's nominal.toml.
+    #[arg(long, conflicts_with = "scenario")]
+    pub model: Option<PathBuf>,
     /// Folder for the recording, or for the residuals; a new one under runs/ if absent.
     #[arg(long)]
     pub out: Option<PathBuf>,

@@ -1,15 +1,18 @@
 //! From a scenario or a recording to the configurations of a team's agents and the samples they get.
 
+mod beside;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use pleiad_agent::config::{
     AgentConfig, AngleNoise, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LengthNoise,
-    MotionSection, OutputSection, PriorSection, RangeBearingNoise, SensorsSection, Strategy,
+    MotionSection, OutputSection, PriorSection, RangeBearingNoise, RobotCorrection, SensorsSection, Strategy,
 };
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::{RobotId, Timestamp};
+use pleiad_physics::Drive;
 use pleiad_recording::{Recording, RobotRecording};
 use pleiad_sim_peers::agents;
 use pleiad_sim_peers::scenario::RobotSettings;
@@ -17,6 +20,9 @@ use pleiad_sim_peers::{Scenario, SimulatedRun};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
+
+pub use beside::{MODEL, copy_model, write_beside};
+use beside::{model_for, priors_beside};
 
 use crate::cli::{AbsoluteArg, ErrorArg, LandmarksArg, StrategyArg};
 
@@ -40,50 +46,10 @@ pub struct NoiseFile {
     pub sensors: SensorsSection,
 }
 
-/// File of a recording that says what the robots were told of their start: a table per robot's number. A
-/// robot that is not in it was told nothing.
-const PRIORS: &str = "priors.toml";
-
 /// The recording in a run folder, or the folder itself.
 pub fn recording_folder(folder: &Path) -> PathBuf {
     let within = folder.join("recording");
     if within.is_dir() { within } else { folder.to_owned() }
-}
-
-/// Writes beside a recording what a replay has to know of its robots: noise, geometry and start.
-pub fn write_beside(agents: &BTreeMap<RobotId, AgentConfig>, folder: &Path) -> anyhow::Result<()> {
-    let write = |name: &str, text: String| {
-        let path = folder.join(name);
-        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
-    };
-    let mut priors = BTreeMap::new();
-    for (robot, agent) in agents {
-        let (filter, motion, sensors) = (agent.filter.clone(), agent.motion.clone(), agent.sensors.clone());
-        write(&format!("noise-r{robot}.toml"), toml::to_string(&NoiseFile { filter, motion, sensors })?)?;
-        if let Some(prior) = &agent.prior {
-            priors.insert(robot.to_string(), prior);
-        }
-    }
-    write(PRIORS, toml::to_string(&priors)?)
-}
-
-/// What the robots of a recording were told of their start, if it says so.
-fn priors_beside(folder: &Path) -> anyhow::Result<Option<BTreeMap<RobotId, PriorSection>>> {
-    let path = folder.join(PRIORS);
-    if !path.is_file() {
-        return Ok(None);
-    }
-    let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let tables: BTreeMap<String, PriorSection> =
-        toml::from_str(&text).with_context(|| format!("{}", path.display()))?;
-    let mut priors = BTreeMap::new();
-    for (name, prior) in tables {
-        let Ok(robot) = name.parse() else {
-            bail!("{}: found the table [{name}], expected the number of a robot", path.display());
-        };
-        priors.insert(RobotId(robot), prior);
-    }
-    Ok(Some(priors))
 }
 
 /// A team ready to run.
@@ -185,7 +151,9 @@ pub struct ReplayOptions<'a> {
     pub seconds: Option<f64>,
     pub seed: u64,
     pub noise: Option<&'a Path>,
-    /// The folder the recording came from, which may hold a `noise.toml`.
+    /// A model of the robots.
+    pub model: Option<&'a Path>,
+    /// The folder the recording came from, which may hold a `noise.toml` and a `model.toml`.
     pub folder: &'a Path,
     pub mrclam: bool,
 }
@@ -228,6 +196,7 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
         }
     };
     let mut notes = Vec::new();
+    let model = model_for(options.model, options.folder)?;
     add_fixes(&mut recording, options, (start, end))?;
     let landmarks = map(&recording);
     let mut agents = BTreeMap::new();
@@ -235,10 +204,19 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
     for (robot, channels) in &recording.robots {
         let noise = noise_for(*robot, &recording, options)?;
         let mut agent = configuration(*robot, &noise, options.filter, &landmarks);
+        agent.model.clone_from(&model);
+        let correction = agent.correction()?;
+        for remark in correction.iter().flat_map(|correction| &correction.remarks) {
+            // Much the same for every robot of a team.
+            let note = format!("model: {remark}");
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
         let mut fed = channels.samples();
         if let Some(told) = &told {
             agent.prior = told.get(robot).cloned();
-        } else if let Some((time, prior)) = prior(channels) {
+        } else if let Some((time, prior)) = prior(channels, correction.as_ref()) {
             let before = fed.len();
             fed.retain(|sample| sample.time >= time);
             if fed.len() < before {
@@ -260,10 +238,15 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
     Ok(Team { agents, samples, recording, notes })
 }
 
-/// The true pose at the first odometry that has one.
-fn prior(channels: &RobotRecording) -> Option<(Timestamp, PriorSection)> {
+/// The true pose at the first odometry that has one, with its stamp.
+fn prior(
+    channels: &RobotRecording,
+    correction: Option<&RobotCorrection>,
+) -> Option<(Timestamp, PriorSection)> {
     channels.odometry.iter().find_map(|sample| {
-        let pose = channels.truth_at(sample.time, TRUTH_GAP_S)?;
+        // The robot's clock may be known to be ahead of that of the truth.
+        let ahead_s = correction.map_or(0.0, |own| own.correction.clock_error_s(sample.time.seconds()));
+        let pose = channels.truth_at(sample.time.plus_seconds(-ahead_s), TRUTH_GAP_S)?;
         let prior = PriorSection {
             x_m: pose.x_m(),
             y_m: pose.y_m(),
@@ -331,7 +314,7 @@ fn noise_for(robot: RobotId, recording: &Recording, options: &ReplayOptions) -> 
     };
     let noise = &nominal.noise;
     let (wheel_radius_m, track_width_m) = match nominal.robots.get(&robot) {
-        Some(own) => (Some(own.wheel_radius), Some(own.track_width)),
+        Some(own) => (Some(own.wheel_radius), Some(own.track_width * track_ratio(own.drive))),
         None => (None, None),
     };
     let positive = |sigma_m: f64| (sigma_m > 0.0).then_some(LengthNoise { sigma_m });
@@ -360,4 +343,12 @@ fn noise_for(robot: RobotId, recording: &Recording, options: &ReplayOptions) -> 
             ..SensorsSection::default()
         },
     })
+}
+
+/// Effective over geometric track: wheels that skid in turns turn the robot less.
+fn track_ratio(drive: Drive) -> f64 {
+    match drive {
+        Drive::SkidSteer { track_ratio } => track_ratio,
+        Drive::Differential | Drive::CarLike { .. } => 1.0,
+    }
 }

@@ -12,6 +12,8 @@ mod errors;
 mod help;
 #[path = "command_line/json.rs"]
 mod json;
+#[path = "command_line/models.rs"]
+mod models;
 
 use std::path::Path;
 

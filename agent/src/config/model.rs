@@ -14,16 +14,19 @@ pub struct RobotCorrection {
     pub correction: Correction,
     /// What velocity odometry is.
     pub velocity: VelocityName,
+    /// What of the model is not used, for an operator to know.
+    pub remarks: Vec<String>,
 }
 
 impl AgentConfig {
-    /// Reads the model, if there is one. What was not read of it is named in `warnings`.
+    /// Reads the model, if there is one.
     ///
     /// # Errors
     /// [`ConfigError::Model`], [`ConfigError::NotInModel`].
-    pub fn correction(&self, warnings: &mut Vec<String>) -> Result<Option<RobotCorrection>, ConfigError> {
+    pub fn correction(&self) -> Result<Option<RobotCorrection>, ConfigError> {
         let Some(path) = &self.model else { return Ok(None) };
-        let models = read_model(path, warnings).map_err(|error| ConfigError::Model(Box::new(error)))?;
+        let mut remarks = Vec::new();
+        let models = read_model(path, &mut remarks).map_err(|error| ConfigError::Model(Box::new(error)))?;
         let robot = self.robot;
         let model = models
             .model(RobotId(robot))
@@ -36,6 +39,9 @@ impl AgentConfig {
         let radius_m = self.motion.wheel_radius_m.unwrap_or(model.nominal.wheel_radius);
         let track_m = self.motion.track_width_m.unwrap_or(model.nominal.track_width * ratio);
         let correction = Correction::new(model, Nominal::ideal(radius_m, track_m));
-        Ok(Some(RobotCorrection { correction, velocity: self.motion.velocity }))
+        remarks.extend(correction.not_corrected().into_iter().map(|(effect, reason)| {
+            format!("effect {} is not taken out of readings: {reason}", effect.name())
+        }));
+        Ok(Some(RobotCorrection { correction, velocity: self.motion.velocity, remarks }))
     }
 }

@@ -264,7 +264,7 @@ impl Normal {
     }
 
     /// The step of these equations with the diagonal raised by a share.
-    fn step(&self, damping: f64) -> Option<DVector<f64>> {
+    pub(crate) fn step(&self, damping: f64) -> Option<DVector<f64>> {
         // Scaled to a unit diagonal, so that units of parameters do not matter.
         let size = self.gradient.len();
         let scale: Vec<f64> =

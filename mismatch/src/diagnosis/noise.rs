@@ -4,7 +4,7 @@
 //! it is for a normal distribution. For normal residuals it is their standard deviation; up to a tenth of wild
 //! ones moves it little. With the scales profiled out, a model's log-likelihood is `-sum n log s`.
 
-use crate::diagnosis::unit::Unit;
+use crate::diagnosis::unit::{Row, Unit};
 
 /// A residual counts as this many sigmas at most.
 pub(crate) const CLIP: f64 = 5.0;
@@ -43,16 +43,17 @@ pub(crate) fn rho(z: f64) -> f64 {
 
 /// Estimates the noise from residuals.
 pub(crate) fn estimate(unit: &Unit<'_>, residuals: &[f64]) -> Noise {
+    estimate_from(unit, residuals, &|_| true)
+}
+
+/// Estimates the noise of all elements from those for which `kept` holds.
+pub(crate) fn estimate_from(unit: &Unit<'_>, residuals: &[f64], kept: &dyn Fn(usize) -> bool) -> Noise {
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); unit.scales.len()];
-    for (index, &scale) in unit.scale_of.iter().enumerate() {
+    for (index, &scale) in unit.scale_of.iter().enumerate().filter(|(index, _)| kept(*index)) {
         members[scale].push(index);
     }
-    let mut noise = Noise {
-        sigma: vec![1.0; residuals.len()],
-        scales: Vec::new(),
-        log_likelihood: 0.0,
-        per_scale: Vec::new(),
-    };
+    let mut noise =
+        Noise { sigma: Vec::new(), scales: Vec::new(), log_likelihood: 0.0, per_scale: Vec::new() };
     for own in &members {
         let agitated: Vec<f64> = own.iter().map(|&index| unit.rows[index].agitation).collect();
         let values: Vec<f64> = own.iter().map(|&index| residuals[index]).collect();
@@ -69,13 +70,12 @@ pub(crate) fn estimate(unit: &Unit<'_>, residuals: &[f64]) -> Noise {
             }
         }
         let cost = own.len() as f64 * scale.ln() + spreads.iter().map(|spread| spread.ln()).sum::<f64>();
-        for (&index, spread) in own.iter().zip(&spreads) {
-            noise.sigma[index] = scale * spread;
-        }
         noise.scales.push(scale);
         noise.per_scale.push(-cost);
         noise.log_likelihood -= cost;
     }
+    let sigma = |(row, &scale): (&Row, &usize)| noise.scales[scale].hypot(row.agitation.sqrt());
+    noise.sigma = unit.rows.iter().zip(&unit.scale_of).map(sigma).collect();
     noise
 }
 

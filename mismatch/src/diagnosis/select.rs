@@ -311,3 +311,14 @@ fn prune(units: &[&Unit<'_>], mut current: Fit) -> Option<Fit> {
         }
     }
 }
+
+/// Candidates of an entry beside a fit.
+pub(crate) fn linearized_beside(units: &[&Unit<'_>], fit: &Fit, (effect, whose): Entry) -> Vec<Candidate> {
+    candidates(effect, whose, units, &fit.terms, &fit.states)
+}
+
+/// Every candidate of the entries beside a fit, scored.
+pub(crate) fn scored_beside(units: &[&Unit<'_>], fit: &Fit, entries: &[Entry]) -> Vec<Scored> {
+    let mut pool = Pool::default();
+    pool.scored(units, entries, fit)
+}

@@ -64,6 +64,7 @@ pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
                 seconds: args.seconds,
                 seed: 1,
                 noise: None,
+                model: None,
                 folder: &folder,
                 mrclam: ingest.form == pleiad_recording::Form::Mrclam,
             },

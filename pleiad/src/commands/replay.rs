@@ -82,6 +82,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         seconds: args.seconds,
         seed: args.seed,
         noise: args.noise.as_deref(),
+        model: args.model.as_deref(),
         folder: &folder,
         mrclam: ingest.form == pleiad_recording::Form::Mrclam,
     };

@@ -100,9 +100,14 @@ pub fn as_processes(team: &Team, out: &Path, options: &ProcessOptions) -> anyhow
     let endpoints = endpoints(&robots)?;
     // A name of its own, so that runs on one machine do not hear one another.
     let name = format!("run-{:016x}", getrandom::u64().context("the system gives no random number")?);
+    // Beside the run, so that it can be looked at and run again.
+    if let Some(model) = team.agents.values().find_map(|agent| agent.model.as_ref()) {
+        setup::copy_model(model, &out.join(setup::MODEL))?;
+    }
     let mut entries = Vec::new();
     for (robot, agent) in &team.agents {
         let mut agent = agent.clone();
+        agent.model = agent.model.map(|_| Path::new("../..").join(setup::MODEL));
         let endpoint = endpoints.get(robot).context("an endpoint for every robot")?;
         agent.team.clone_from(&name);
         agent.bus = BusSection {

@@ -18,6 +18,8 @@ use crate::{folder, output, setup};
 #[derive(Debug, Serialize)]
 struct SimulateJson {
     recording: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    model: Option<String>,
     folder: String,
     robots: Vec<RobotJson>,
 }
@@ -59,11 +61,19 @@ pub fn run(args: &SimulateArgs) -> anyhow::Result<()> {
 
 fn predict(from: &Path, args: &SimulateArgs) -> anyhow::Result<()> {
     let recording_folder = setup::recording_folder(from);
-    let (recording, _) = pleiad_recording::open(&recording_folder, &ReadOptions::default())?;
+    let (mut recording, _) = pleiad_recording::open(&recording_folder, &ReadOptions::default())?;
+    if let Some(path) = &args.model {
+        let mut warnings = Vec::new();
+        recording.nominal = Some(pleiad_recording::read_model(path, &mut warnings)?);
+        for warning in warnings {
+            tracing::warn!("{warning}");
+        }
+    }
     let robots = compare(&recording)?;
     let folder = folder::create(args.out.as_deref(), "simulate")?;
     let json = SimulateJson {
         recording: from.display().to_string(),
+        model: args.model.as_ref().map(|path| path.display().to_string()),
         folder: folder.display().to_string(),
         robots: robots.iter().map(|robot| write_robot(&folder, robot)).collect::<Result<_, _>>()?,
     };

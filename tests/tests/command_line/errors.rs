@@ -15,6 +15,22 @@ fn refused(arguments: &[&str], words: &[&str]) {
     std::fs::write(folder.path().join("misspelt.toml"), misspelt).unwrap();
     let agent = "team = \"pleiad\"\nrobot = 1\n\n[motion]\nlongest_gab_s = 1.0\n";
     std::fs::write(folder.path().join("agent.toml"), agent).unwrap();
+    let nominal = std::fs::read_to_string(folder.path().join("recording/nominal.toml")).unwrap();
+    let effect = "\n[[robots.r2.effects]]\nname = \"crab\"\nparameters = { rad = 0.1 }\n";
+    for (name, from, to) in [
+        ("unknown_effect.toml", "\"crab\"", "\"crap\""),
+        ("unknown_parameter.toml", "rad =", "degrees ="),
+        ("no_number.toml", "0.1", "nan"),
+        ("one_robot.toml", "[robots.r1]", "[robots.r9]"),
+        ("no_drive.toml", "[noise]", "drive = \"legs\"\n[noise]"),
+    ] {
+        let text = format!("{nominal}{effect}");
+        assert!(text.contains(from), "{from}");
+        // The last one: nominal values may be equal to it.
+        let at = text.rfind(from).unwrap();
+        let text = format!("{}{to}{}", &text[..at], &text[at + from.len()..]);
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
     let coordinator = "team = \"pleiad\"\nagents = []\nrestrat = \"never\"\n";
     std::fs::write(folder.path().join("coordinator.toml"), coordinator).unwrap();
 
@@ -115,4 +131,22 @@ fn a_feed_that_nobody_takes_is_a_failure() {
 fn an_option_that_could_do_nothing_is_refused() {
     refused(&["observability", "recording", "--seed", "2"], &["--seed", "scenarios"]);
     refused(&["observability", "small.toml", "--landmarks", "none"], &["--landmarks", "recordings"]);
+}
+
+#[test]
+fn a_model_that_cannot_be_used_is_named_with_its_key_and_the_remedy() {
+    for (model, words) in [
+        ("nowhere.toml", &["nowhere.toml is missing", "corrected.toml"][..]),
+        ("unknown_effect.toml", &["robots.r2.effects[0].name", "\"crap\"", "perhaps \"crab\""]),
+        ("unknown_parameter.toml", &["robots.r2.effects[0].parameters.degrees", "which has: rad"]),
+        ("no_number.toml", &["robots.r2.effects[0].parameters.rad", "`nan`", "a number (rad)"]),
+        ("no_drive.toml", &["key `drive`", "`\"legs\"`", "skid_steer"]),
+        ("small.toml", &["small.toml", "noise"]),
+    ] {
+        refused(&["replay", "recording", "--model", model, "--out", "out"], words);
+        refused(&["simulate", "--from", "recording", "--model", model], words);
+    }
+    let lacking = ["one_robot.toml", "r1"];
+    refused(&["replay", "recording", "--model", "one_robot.toml", "--out", "out"], &lacking);
+    refused(&["simulate", "--from", "recording", "--model", "one_robot.toml"], &["r1"]);
 }

@@ -1,0 +1,65 @@
+//! The nominal model with what was found.
+
+use pleiad_physics::{ActiveEffect, RobotModel};
+use pleiad_recording::{DeclaredEffect, EffectSpec, Nominal, NominalNoise, NominalRangeSensor, NominalRobot};
+
+use crate::diagnosis::naming::{Estimated, Judged};
+use crate::diagnosis::run::Prepared;
+
+/// View of a sensor of which nothing is declared: a half circle, and farther than any map.
+const UNDECLARED_RANGE_M: f64 = 100.0;
+
+/// The nominal model of a recording with the effects that were found.
+pub(crate) fn corrected(own: &Prepared<'_>, found: &[&Judged]) -> Nominal {
+    let mut nominal = own.recording.nominal.clone().unwrap_or_else(|| undeclared(own));
+    for judged in found {
+        let term = &judged.estimated.term;
+        for (robot, declared) in &mut nominal.robots {
+            if term.acts_on(*robot) {
+                declared.effects.push(effect(&judged.estimated));
+            }
+        }
+    }
+    nominal
+}
+
+fn effect(estimated: &Estimated) -> DeclaredEffect {
+    let active: ActiveEffect<f64> = estimated.term.active();
+    let ci95 = (0..estimated.term.values.len()).map(|parameter| estimated.interval(parameter)).collect();
+    DeclaredEffect { active, ci95 }
+}
+
+/// The section of a model file that applies a finding.
+pub(crate) fn section(estimated: &Estimated) -> String {
+    let spec = EffectSpec::from(&effect(estimated));
+    toml::to_string(&spec).map_or_else(|_| String::new(), |text| text.trim_end().to_owned())
+}
+
+/// A model file for a recording that came without one: what the built-in model holds.
+fn undeclared(own: &Prepared<'_>) -> Nominal {
+    let first = own.models.values().next();
+    let noise = first.map_or_else(NominalNoise::default, |model| NominalNoise {
+        range_sigma_m: model.nominal.range_sigma_m,
+        bearing_sigma_rad: model.nominal.bearing_sigma_rad,
+        ..NominalNoise::default()
+    });
+    let range_sensor = NominalRangeSensor {
+        max_range_m: UNDECLARED_RANGE_M,
+        half_fov_rad: std::f64::consts::FRAC_PI_2,
+        detection_probability: 1.0,
+        range_scale: 1.0,
+        ..NominalRangeSensor::default()
+    };
+    let robots = own.models.iter().map(|(&robot, model)| (robot, declared(model))).collect();
+    Nominal { noise, range_sensor, robots }
+}
+
+fn declared(model: &RobotModel<f64>) -> NominalRobot {
+    NominalRobot {
+        wheel_radius: model.nominal.wheel_radius,
+        track_width: model.nominal.track_width,
+        gyro_scale: model.nominal.gyro_scale,
+        drive: model.drive,
+        ..NominalRobot::default()
+    }
+}

@@ -1,0 +1,125 @@
+//! What a finding is worth on data that the fit did not see.
+//!
+//! Folds are contiguous. For each, the parameters are fitted to the rest, less an embargo on both sides, by a
+//! step from the fit to everything: so close to it that one linearization is enough.
+
+use std::ops::Range;
+
+use nalgebra::DVector;
+
+use crate::diagnosis::fit::{Fit, Normal, State};
+use crate::diagnosis::noise;
+use crate::diagnosis::term::Term;
+use crate::diagnosis::unit::Unit;
+
+/// How many folds.
+pub(crate) const FOLDS: usize = 5;
+/// Nothing this close to a fold is fitted, seconds.
+const EMBARGO_S: f64 = 5.0;
+
+/// A gain of log score with its standard error.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Gain {
+    pub(crate) total: f64,
+    pub(crate) standard_error: f64,
+}
+
+/// A fold of a unit: its span of time.
+pub(crate) fn fold(unit: &Unit<'_>, number: usize) -> Range<f64> {
+    let (first_s, last_s) = unit.span_s;
+    let length_s = (last_s - first_s) / FOLDS as f64;
+    let from_s = first_s + length_s * number as f64;
+    let to_s = if number + 1 == FOLDS { f64::INFINITY } else { from_s + length_s };
+    from_s..to_s
+}
+
+/// The terms of a fit as they would be without a fold, and the residuals of the units under them.
+pub(crate) fn left_out(units: &[&Unit<'_>], fit: &Fit, number: usize) -> (Vec<Term>, Vec<State>) {
+    let training = |unit: &Unit<'_>, index: usize| {
+        let fold = fold(unit, number);
+        let time_s = unit.rows[index].time_s;
+        time_s < fold.start - EMBARGO_S || time_s >= fold.end + EMBARGO_S
+    };
+    let masked = |(unit, state): (&&Unit<'_>, &State)| {
+        let mut state = state.clone();
+        for index in (0..unit.rows.len()).filter(|&index| !training(unit, index)) {
+            state.noise.sigma[index] = f64::INFINITY;
+        }
+        state
+    };
+    let states: Vec<State> = units.iter().zip(&fit.states).map(masked).collect();
+    let normal = Normal::new(units, &states, &fit.columns, fit.slots.len());
+    let step = normal.step(1e-9).unwrap_or_else(|| DVector::zeros(fit.slots.len()));
+    let mut terms = fit.terms.clone();
+    for (&(term, parameter), change) in fit.slots.iter().zip(step.iter()) {
+        terms[term].values[parameter] += change;
+    }
+    let moved = |((unit, state), columns): ((&&Unit<'_>, &State), &Vec<crate::diagnosis::unit::Column>)| {
+        let mut residuals = state.residuals.clone();
+        for (column, change) in columns.iter().zip(step.iter()) {
+            for (part, stretch) in column.parts.iter().zip(&unit.stretches) {
+                let Some(part) = part else { continue };
+                for (residual, slope) in residuals[stretch.range()].iter_mut().zip(part) {
+                    *residual += slope * change;
+                }
+            }
+        }
+        State { noise: noise::estimate_from(unit, &residuals, &|index| training(unit, index)), residuals }
+    };
+    let states = units.iter().zip(&fit.states).zip(&fit.columns).map(moved).collect();
+    (terms, states)
+}
+
+/// The gain of one fit over another on folds that neither saw.
+pub(crate) fn cross_fitted(units: &[&Unit<'_>], with: &Fit, without: &Fit) -> Gain {
+    let mut blocks: Vec<Vec<f64>> = units.iter().map(|unit| vec![0.0; unit.blocks]).collect();
+    for number in 0..FOLDS {
+        let (_, with) = left_out(units, with, number);
+        let (_, without) = left_out(units, without, number);
+        for ((unit, blocks), (with, without)) in
+            units.iter().zip(&mut blocks).zip(with.iter().zip(&without))
+        {
+            let fold = fold(unit, number);
+            add(unit, with, without, blocks, &|index| fold.contains(&unit.rows[index].time_s));
+        }
+    }
+    summed(&blocks)
+}
+
+/// The gain of one set of states over another, where noise is known from elsewhere.
+pub(crate) fn compared(units: &[&Unit<'_>], with: &[State], without: &[State]) -> Gain {
+    let mut blocks: Vec<Vec<f64>> = units.iter().map(|unit| vec![0.0; unit.blocks]).collect();
+    for ((unit, blocks), (with, without)) in units.iter().zip(&mut blocks).zip(with.iter().zip(without)) {
+        add(unit, with, without, blocks, &|_| true);
+    }
+    summed(&blocks)
+}
+
+/// Adds the gain of each element to its block.
+fn add(unit: &Unit<'_>, with: &State, without: &State, blocks: &mut [f64], held: &dyn Fn(usize) -> bool) {
+    for index in (0..unit.rows.len()).filter(|&index| held(index)) {
+        blocks[unit.block_of[index]] += gain(with, without, index);
+    }
+}
+
+/// Log-density that an element gains by the better model, both at the noise of the better one: a model gains
+/// by what it predicts, not by claiming less noise where errors are small and more where they are not. What
+/// is farther off than [`noise::CLIP`] sigmas counts as that far, so that no instant outweighs the rest.
+pub(crate) fn gain(with: &State, without: &State, index: usize) -> f64 {
+    let sigma = with.noise.sigma[index];
+    let square = |state: &State| (state.residuals[index] / sigma).abs().min(noise::CLIP).powi(2);
+    0.5 * (square(without) - square(with))
+}
+
+/// Sum over blocks; its variance with the covariance of neighbours (`newey1987`, one lag).
+fn summed(units: &[Vec<f64>]) -> Gain {
+    let total: f64 = units.iter().flatten().sum();
+    let count = units.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+    let mean = total / count;
+    let mut variance = 0.0;
+    for blocks in units {
+        variance += blocks.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+        variance += blocks.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum::<f64>();
+    }
+    Gain { total, standard_error: variance.max(0.0).sqrt() }
+}

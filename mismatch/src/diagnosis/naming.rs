@@ -1,0 +1,264 @@
+//! From a fitted term to a finding, or to a nuisance that is none.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use nalgebra::DMatrix;
+use pleiad_physics::{Effect, Parameter, Scalar};
+
+use crate::channel::Channel;
+use crate::diagnosis::chi_square::upper_tail;
+use crate::diagnosis::entries::composition;
+use crate::diagnosis::fit::Fit;
+use crate::diagnosis::held_out::{self, Gain};
+use crate::diagnosis::select::{FAMILYWISE, wald};
+use crate::diagnosis::starts::Placing;
+use crate::diagnosis::support::Support;
+use crate::diagnosis::term::Term;
+use crate::diagnosis::unit::{Row, Unit};
+use crate::findings::{Estimate, Place, Verdict};
+
+/// Half the width of a 95 % interval, in standard errors.
+const Z_95: f64 = 1.959_963_984_540_054;
+/// The near end of this many standard errors must be beyond the threshold of relevance.
+const NEAR_END: f64 = 3.0;
+/// The cross-fitted gain must exceed this many standard errors.
+const GAIN_ERRORS: f64 = 2.0;
+/// An effect without a threshold of relevance must change this share of a channel by more than a sigma.
+const LEAST_SHARE_CHANGED: f64 = 0.005;
+/// A place or regime is named if this share of the gain arises there.
+const MAIN_SHARE: f64 = 0.8;
+
+/// What is known of the parameters of a term.
+#[derive(Clone, Debug)]
+pub(crate) struct Estimated {
+    pub(crate) term: Term,
+    /// Standard errors in the order of the parameters; `None` for what was not fitted by its derivative.
+    pub(crate) errors: Vec<Option<f64>>,
+}
+
+impl Estimated {
+    pub(crate) fn of(fit: &Fit, covariance: &DMatrix<f64>, position: usize) -> Self {
+        let term = fit.terms[position].clone();
+        let error = |parameter: usize| {
+            let slot = fit.slots.iter().position(|slot| *slot == (position, parameter))?;
+            let variance = covariance[(slot, slot)];
+            (variance.is_finite() && variance >= 0.0).then(|| variance.sqrt())
+        };
+        let errors = (0..term.values.len()).map(error).collect();
+        let mut estimated = Self { term, errors };
+        estimated.make_positive();
+        estimated
+    }
+
+    /// Of two ways to write the same, the one with a positive amplitude: its phase is half a turn away.
+    fn make_positive(&mut self) {
+        let parameters = self.term.parameters();
+        let [amplitude, phase] = parameters else { return };
+        let turns = phase.unit == "rad" && phase.plausible.1 - phase.plausible.0 > PI;
+        if !turns || phase.relevance.threshold(&pleiad_physics::Floors::default()) > 0.0 {
+            return;
+        }
+        if amplitude.plausible.0 < 0.0 && self.term.values[0] < 0.0 {
+            let period = phase.plausible.1 - phase.plausible.0;
+            let half_turn = if period > 2.0 * PI { PI } else { 0.5 * PI };
+            self.term.values[0] = -self.term.values[0];
+            let moved = self.term.values[1] + half_turn;
+            self.term.values[1] = if half_turn < PI { (2.0 * moved).wrapped() * 0.5 } else { moved.wrapped() };
+        }
+    }
+
+    /// The 95 % interval of a parameter.
+    pub(crate) fn interval(&self, parameter: usize) -> Option<[f64; 2]> {
+        let error = self.errors[parameter]?;
+        let value = self.term.values[parameter];
+        Some([value - Z_95 * error, value + Z_95 * error])
+    }
+
+    /// The parameters as `findings.json` has them; those that were not fitted and are off stay out.
+    #[allow(clippy::float_cmp, reason = "the off value itself")]
+    pub(crate) fn parameters(&self) -> BTreeMap<String, Estimate> {
+        let one = |(index, parameter): (usize, &Parameter)| {
+            let value = self.term.values[index];
+            if self.errors[index].is_none() && value == parameter.off {
+                return None;
+            }
+            let ci95 = self.interval(index).unwrap_or([value, value]);
+            Some((parameter.label(), Estimate { value, unit: parameter.unit.to_owned(), ci95 }))
+        };
+        self.term.parameters().iter().enumerate().filter_map(one).collect()
+    }
+
+    /// Whether the near end of some parameter is beyond its threshold of relevance; `None` if no parameter
+    /// has one.
+    fn is_relevant(&self, unit: &Unit<'_>) -> Option<bool> {
+        let mut known = None;
+        for (index, parameter) in self.term.parameters().iter().enumerate() {
+            let threshold = parameter.relevance.threshold(&unit.floors);
+            let Some(error) = self.errors[index] else { continue };
+            if threshold > 0.0 {
+                let size = (self.term.values[index] - parameter.off).abs();
+                known = Some(known.unwrap_or(false) || size - NEAR_END * error > threshold);
+            }
+        }
+        known
+    }
+}
+
+/// How a term fares under the rules of evidence.
+#[derive(Clone, Debug)]
+pub(crate) struct Judged {
+    pub(crate) estimated: Estimated,
+    pub(crate) verdict: Option<Verdict>,
+    pub(crate) p_familywise: f64,
+    pub(crate) channel: Channel,
+    pub(crate) place: Place,
+    /// The finding happened once: it cannot be cross-validated.
+    pub(crate) one_off: bool,
+}
+
+/// Judges a term. `verdict` is `None` for a nuisance: significant, but too small, or of no use on data that
+/// it was not fitted on.
+pub(crate) fn judge(
+    units: &[&Unit<'_>],
+    support: &Support,
+    estimated: Estimated,
+    full: (&Fit, &DMatrix<f64>, usize),
+    gain: Gain,
+    tests: usize,
+) -> Judged {
+    let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
+    let parameters = estimated.errors.iter().flatten().count().max(1);
+    let ratio =
+        2.0 * (support.with.log_likelihood - support.without.log_likelihood) / support.inflation;
+    let p_ratio = upper_tail(ratio, parameters);
+    let p_wald = wald(full.0, full.1, full.2).map_or(0.0, |(wald, count)| upper_tail(wald, count));
+    let p_familywise = (p_ratio.max(p_wald) * tests as f64).min(1.0);
+    let effect = estimated.term.effect;
+    let one_off = is_impulse(effect);
+    let relevant = acting
+        .iter()
+        .filter_map(|unit| estimated.is_relevant(unit))
+        .reduce(|a, b| a || b)
+        .unwrap_or_else(|| changes_enough(&acting, support));
+    let useful = one_off || gain.total > GAIN_ERRORS * gain.standard_error;
+    let named = p_familywise < FAMILYWISE && relevant && useful;
+    let verdict = named.then(|| {
+        if support.members.len() > 1 {
+            Verdict::CannotTell
+        } else if effect.info().bad_data {
+            Verdict::BadData
+        } else {
+            Verdict::Named
+        }
+    });
+    let place = place(&acting, support, &estimated.term);
+    Judged { estimated, verdict, p_familywise, channel: channel(&acting, support), place, one_off }
+}
+
+/// Effects of one instant.
+fn is_impulse(effect: Effect) -> bool {
+    let info = effect.info();
+    Placing::of(info).onset.is_some() && info.parameters.iter().any(|parameter| parameter.name == "jump")
+}
+
+/// Whether the term changes enough rows by more than a sigma.
+fn changes_enough(units: &[&Unit<'_>], support: &Support) -> bool {
+    let (mut changed, mut all) = (0_usize, 0_usize);
+    for (index, unit) in units.iter().enumerate() {
+        let (with, without) = (&support.with.states[index], &support.without.states[index]);
+        for stretch in &unit.stretches {
+            let range = stretch.range();
+            let in_stretch = range
+                .clone()
+                .filter(|&row| {
+                    (with.residuals[row] - without.residuals[row]).abs() > with.noise.sigma[row]
+                })
+                .count();
+            if in_stretch > 0 {
+                changed += in_stretch;
+                all += range.len();
+            }
+        }
+    }
+    changed as f64 > LEAST_SHARE_CHANGED * all as f64
+}
+
+/// The channel in which the term gains most.
+fn channel(units: &[&Unit<'_>], support: &Support) -> Channel {
+    let mut gains: BTreeMap<Channel, f64> = BTreeMap::new();
+    for (index, unit) in units.iter().enumerate() {
+        let (with, without) = (&support.with.states[index].noise, &support.without.states[index].noise);
+        for (scale, (channel, _)) in unit.scales.iter().enumerate() {
+            *gains.entry(*channel).or_default() += with.per_scale[scale] - without.per_scale[scale];
+        }
+    }
+    gains.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(Channel::Body, |(channel, _)| channel)
+}
+
+/// Regimes in words, the most particular first where several hold.
+type Regime = (&'static str, fn(&Row) -> bool);
+const REGIMES: [Regime; 8] = [
+    ("standing", |row| row.regime.speed_m_s.abs() < 0.01 && row.regime.yaw_rate_rad_s.abs() < 0.02),
+    ("turning in place", |row| row.regime.speed_m_s.abs() < 0.05 && row.regime.yaw_rate_rad_s.abs() > 0.1),
+    ("driving backwards", |row| row.regime.speed_m_s < -0.02),
+    ("turning left", |row| row.regime.yaw_rate_rad_s > 0.1),
+    ("turning right", |row| row.regime.yaw_rate_rad_s < -0.1),
+    ("speeding up or braking", |row| row.regime.acceleration_m_s2.abs() > 0.3),
+    ("turning", |row| row.regime.yaw_rate_rad_s.abs() > 0.1),
+    ("driving", |row| row.regime.speed_m_s.abs() > 0.05),
+];
+
+/// Where the gain of a term arises.
+fn place(units: &[&Unit<'_>], support: &Support, term: &Term) -> Place {
+    let placing = Placing::of(term.effect.info());
+    let region_m = placing.region.map(|first| {
+        [term.values[first], term.values[first + 1], term.values[first + 2], term.values[first + 3]]
+    });
+    let end_s = units.iter().map(|unit| unit.span_s.1).fold(f64::NEG_INFINITY, f64::max);
+    let time = placing.onset.map_or(Vec::new(), |onset| {
+        let from_s = term.values[onset];
+        vec![[from_s, if is_impulse(term.effect) { from_s } else { end_s }]]
+    });
+    let mut total = 0.0;
+    let mut gains = [0.0; REGIMES.len()];
+    let mut counts = [0_usize; REGIMES.len()];
+    let mut count = 0;
+    for (index, unit) in units.iter().enumerate() {
+        let (with, without) = (&support.with.states[index], &support.without.states[index]);
+        for (row, meaning) in unit.rows.iter().enumerate() {
+            let gain = held_out::gain(with, without, row);
+            total += gain;
+            count += 1;
+            for ((_, holds), (sum, number)) in REGIMES.iter().zip(gains.iter_mut().zip(&mut counts)) {
+                if holds(meaning) {
+                    *sum += gain;
+                    *number += 1;
+                }
+            }
+        }
+    }
+    // Of the regimes in which most of the gain arises, the rarest; none if it is most of the run anyway.
+    let main = (0..REGIMES.len())
+        .filter(|&regime| {
+            gains[regime] > MAIN_SHARE * total && (counts[regime] as f64) < MAIN_SHARE * f64::from(count)
+        })
+        .min_by_key(|&regime| counts[regime]);
+    let regime = main.map_or("", |regime| REGIMES[regime].0).to_owned();
+    Place { time, region_m, regime }
+}
+
+/// A composite of the catalogue that is the same as two terms of one robot together.
+pub(crate) fn disguise(terms: &[Term]) -> Vec<(Effect, [usize; 2])> {
+    let mut found = Vec::new();
+    for &effect in Effect::ALL {
+        let Some([first, second]) = composition(effect) else { continue };
+        for (a, one) in terms.iter().enumerate().filter(|(_, term)| term.effect == first) {
+            let other = terms.iter().position(|term| term.effect == second && term.whose == one.whose);
+            if let Some(b) = other {
+                found.push((effect, [a, b]));
+            }
+        }
+    }
+    found
+}
