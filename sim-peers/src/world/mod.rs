@@ -5,8 +5,8 @@
 //! which they say `U = exp((v dt, 0, w dt))` it moves by `U exp(n)`, `n ~ N(0, Q dt)` white from tick to
 //! tick and independent of everything else; odometry reports `U` without error. So a filter that integrates
 //! the reports and adds `Ad_N Q dt Ad_N^T` (N after the step) has the law of this world, but for changes of
-//! speed within a tick, which are a tenth of a sigma at most. Within a tick `n` grows as a Brownian motion,
-//! whose variance is the linear `C(t)` such a filter interpolates.
+//! speed within a tick (`docs/scenario.md`). Within a tick `n` grows as a Brownian motion, whose variance is
+//! the linear `C(t)` such a filter interpolates.
 
 mod connectivity;
 mod drive;

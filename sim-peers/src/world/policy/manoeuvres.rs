@@ -102,14 +102,11 @@ impl Manoeuvres {
 
     fn choose(&mut self, view: &View<'_>) {
         if self.deck.is_empty() {
-            self.deck = programme(&self.limits);
-            // Fisher and Yates.
-            for last in (1..self.deck.len()).rev() {
-                let other = ((last + 1) as f64 * uniform(&mut self.stream)).floor();
-                // The draw is below `last + 1`.
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-                self.deck.swap(last, other as usize);
-            }
+            let [first, rest] = programme(&self.limits);
+            // Taken from the end.
+            self.deck = self.shuffled(rest);
+            let first = self.shuffled(first);
+            self.deck.extend(first);
         }
         let Some(next) = self.deck.pop() else { return };
         let heading_rad = between(&mut self.stream, -PI, PI);
@@ -124,6 +121,17 @@ impl Manoeuvres {
         };
         let give_up_s = view.time_s + PATIENCE_S;
         self.phase = Phase::Approaching { next, to, heading_rad, give_up_s, arrived: false };
+    }
+
+    /// By Fisher and Yates.
+    fn shuffled(&mut self, mut manoeuvres: Vec<Manoeuvre>) -> Vec<Manoeuvre> {
+        for last in (1..manoeuvres.len()).rev() {
+            let other = ((last + 1) as f64 * uniform(&mut self.stream)).floor();
+            // The draw is below `last + 1`.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            manoeuvres.swap(last, other as usize);
+        }
+        manoeuvres
     }
 
     /// The command on the way to the start; none when it is reached.
