@@ -203,6 +203,7 @@ fn words(channel: Channel) -> &'static str {
     match channel {
         Channel::Actuator => "wheels against commands",
         Channel::Body => "motion against wheels",
+        Channel::CommandedBody => "motion against commands",
         Channel::Gyro => "gyro",
         Channel::Gps => "GPS",
         Channel::Heading => "absolute heading",
