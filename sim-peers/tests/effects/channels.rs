@@ -119,6 +119,7 @@ fn changed(one: &RobotRecording, other: &RobotRecording) -> String {
         ("gps", one.gps == other.gps),
         ("heading", same(&one.heading, &other.heading)),
         ("sightings", one.sightings == other.sightings),
+        ("steer", one.steer == other.steer),
         ("truth", one.truth == other.truth),
     ];
     channels.into_iter().filter(|(_, same)| !same).map(|(name, _)| name).collect::<Vec<_>>().join(" ")
