@@ -1,7 +1,7 @@
 //! Odometry as the motion of the body.
 
 use super::Correction;
-use crate::chain::actuator::{ActuatorState, Command, Scheduled, schedule, turn};
+use crate::chain::actuator::{ActuatorState, Command, Scheduled, schedule_next, turn};
 use crate::chain::body::{BodyStep, advance};
 use crate::chain::robot::Robot;
 use crate::context::{Chance, Context, Surroundings};
@@ -116,7 +116,12 @@ impl OdometryCorrection {
                 Some(OdometryReading::Commanded { .. }),
                 OdometryReading::Commanded { speed_m_s, yaw_rate_rad_s },
             ) => {
-                self.command(model, Command { time_s, speed_m_s, yaw_rate_rad_s });
+                let command = Command { time_s, speed_m_s, yaw_rate_rad_s };
+                let context = Context {
+                    time_s,
+                    ..self.robot.context(model, Surroundings::default(), Chance::EXPECTED)
+                };
+                schedule_next(model, &context, command, &mut self.scheduled);
                 self.drive(model, time_s);
                 Pose::identity()
             }
@@ -145,16 +150,6 @@ impl OdometryCorrection {
         motion.acceleration_m_s2 = acceleration_m_s2;
         for (angle, turned) in motion.wheel_angle_rad.iter_mut().zip(turned_rad) {
             *angle += turned;
-        }
-    }
-
-    /// Schedules a command behind those before it, as [`schedule`] does for all at once.
-    fn command(&mut self, model: &RobotModel<f64>, command: Command) {
-        for mut next in schedule(model, &[command], |_| Chance::EXPECTED) {
-            if let Some(last) = self.scheduled.last() {
-                next.from_s = next.from_s.max(last.from_s);
-            }
-            self.scheduled.push(next);
         }
     }
 

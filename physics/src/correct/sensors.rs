@@ -6,7 +6,7 @@ use crate::chain::sensors::{self, Seen};
 use crate::model::RobotModel;
 use crate::pose::Pose;
 use crate::scalar::Scalar;
-use crate::signal::{GpsReading, SightingGeometry, Target};
+use crate::signal::Target;
 
 /// How far a target is taken to be whose bearing alone is known, metres: so far that a lever arm of the
 /// sensor does not matter.
@@ -36,17 +36,12 @@ impl Polar {
 impl Correction {
     /// How old a position is at its stamp, seconds: to be subtracted from the stamp.
     pub fn gps_latency_s(&self, place: &Place) -> f64 {
-        let nominal = &self.model.nominal;
-        let context = place.context(&self.model);
-        let mut reading =
-            GpsReading { lever_m: [0.0; 2], latency_s: nominal.gps_latency_s, error_m: [0.0; 2] };
-        self.model.apply(&context, |effect, values| effect.gps(values, &context, &mut reading));
-        reading.latency_s
+        sensors::gps_reading(&self.model, &place.context(&self.model)).latency_s
     }
 
     /// How old range and bearing are at their stamp, seconds: to be subtracted from the stamp.
     pub fn sighting_latency_s(&self, place: &Place, target: Target) -> f64 {
-        geometry(&self.model, place, target).latency_s
+        sensors::sighting_geometry(&self.model, &place.context(&self.model), target, [0.0; 2]).latency_s
     }
 
     /// A position, metres in the map. The place is that of the instant the position is of.
@@ -110,7 +105,9 @@ impl Correction {
 
     /// The relative yaw of a robot whose pose was seen, radians.
     pub fn relative_yaw(&self, place: &Place, target: Target, yaw_rad: f64) -> f64 {
-        let of = |model: &RobotModel<f64>| geometry(model, place, target).yaw_rad;
+        let of = |model: &RobotModel<f64>| {
+            sensors::sighting_geometry(model, &place.context(model), target, [0.0; 2]).yaw_rad
+        };
         yaw_rad + of(&self.model) - of(&self.nominal)
     }
 
@@ -138,21 +135,6 @@ impl Correction {
         as_nominal.bearing_rad = Scalar::wrapped(as_nominal.bearing_rad);
         as_nominal
     }
-}
-
-/// From where and when a model looks.
-fn geometry(model: &RobotModel<f64>, place: &Place, target: Target) -> SightingGeometry<f64> {
-    let nominal = &model.nominal;
-    let context = place.context(model);
-    let mut geometry = SightingGeometry {
-        target,
-        target_m: [0.0; 2],
-        lever_m: [nominal.sensor_mount_x_m, nominal.sensor_mount_y_m],
-        yaw_rad: nominal.sensor_mount_yaw_rad,
-        latency_s: nominal.sensor_latency_s,
-    };
-    model.apply(&context, |effect, values| effect.sighting_geometry(values, &context, &mut geometry));
-    geometry
 }
 
 /// What a model reads of a point of the body frame, which is at rest.

@@ -2,12 +2,13 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 10] = [
+const COMMANDS: [&str; 11] = [
     "demo",
     "run",
     "replay",
     "observability",
     "simulate",
+    "diagnose",
     "effects",
     "agent",
     "coordinator",

@@ -2,6 +2,8 @@
 
 mod choice;
 mod corrected;
+#[cfg(test)]
+mod fixture;
 mod page;
 mod phrases;
 mod sentences;

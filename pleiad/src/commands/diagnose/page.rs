@@ -109,6 +109,7 @@ fn found(finding: &Finding) -> Found {
         robots: finding.robots.iter().map(|robot| RobotId(*robot)).collect(),
         stage: finding.stage.clone(),
         channel: channel_words(&finding.channel),
+        effect: finding.effect.clone(),
         title: name.map_or("something unnamed", title).to_owned(),
         sentences: sentences(finding),
         parameters: finding
@@ -198,19 +199,19 @@ fn evidence(own: &pleiad_mismatch::PartialResidual) -> Evidence {
     }
 }
 
-/// A channel for people.
+/// A channel for people; one that has no words yet goes by its name.
 fn words(channel: Channel) -> &'static str {
-    match channel {
-        Channel::Actuator => "wheels against commands",
-        Channel::Body => "motion against wheels",
-        Channel::CommandedBody => "motion against commands",
-        Channel::Gyro => "gyro",
-        Channel::Gps => "GPS",
-        Channel::Heading => "absolute heading",
-        Channel::RangeToLandmark => "range to landmarks",
-        Channel::BearingToLandmark => "bearing of landmarks",
-        Channel::RangeToRobot => "range to robots",
-        Channel::BearingToRobot => "bearing of robots",
+    match channel.name() {
+        "actuator" => "wheels against commands",
+        "body" => "motion against wheels",
+        "commanded_body" => "motion against commands",
+        "gps" => "GPS",
+        "heading" => "absolute heading",
+        "range_to_landmark" => "range to landmarks",
+        "bearing_to_landmark" => "bearing of landmarks",
+        "range_to_robot" => "range to robots",
+        "bearing_to_robot" => "bearing of robots",
+        name => name,
     }
 }
 
@@ -230,4 +231,42 @@ fn component(channel: Channel, position: usize) -> (String, String) {
     }
     let suffix = format!("_{}", own.unit.replace('/', "_"));
     (own.name.trim_end_matches(&suffix).replace('_', " "), own.unit.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use pleiad_mismatch::Plots;
+    use pleiad_recording::RobotRecording;
+    use pleiad_report::{diagnose_report, summary_text};
+
+    use super::super::fixture;
+    use super::*;
+
+    fn recording() -> Recording {
+        let robots = [1, 2].map(|robot| (RobotId(robot), RobotRecording::default()));
+        Recording { name: "square".into(), robots: robots.into(), ..Recording::default() }
+    }
+
+    #[test]
+    fn a_diagnosis_becomes_a_page_with_its_findings_where_they_belong() {
+        let diagnosis =
+            Diagnosis { findings: fixture::findings(), plots: Plots::default(), corrected: [].into() };
+        let report = report(&diagnosis, &[recording()], &[("square".to_owned(), PathBuf::from("square"))]);
+        assert_eq!(report.findings[0].title, "unequal wheel diameters");
+        assert!(report.findings[0].rivals.is_empty(), "an effect is no rival of itself");
+        assert_eq!(report.findings[1].rivals, ["actuator lag (first order)"]);
+        // Tested with a sensor effect on robot 1 only; an effect of the body that no robot can show.
+        let stages: Vec<_> =
+            report.tested.iter().map(|test| (test.robot.0, &*test.stage, test.testable)).collect();
+        assert_eq!(stages, [(1, "sensor", true), (1, "body", false), (2, "body", false)]);
+        let html = diagnose_report(&report).unwrap().render();
+        assert!(html.contains("cannot tell transport delay from actuator lag (first order)"));
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_is_null_in_json() {
+        let text = summary_text(&fixture::findings()).unwrap();
+        assert!(text.contains("\"minimum_detectable\": null"), "{text}");
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+    }
 }

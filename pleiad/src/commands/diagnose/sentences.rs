@@ -51,10 +51,14 @@ pub(super) fn sentences(finding: &Finding) -> Vec<String> {
     if !said.is_empty() {
         return said;
     }
+    let shape = finding.expression.as_ref().map(|expression| {
+        let units = finding.expression_units.as_ref().map_or(String::new(), |units| format!(" [{units}]"));
+        format!("the shape {expression}{units} describes it")
+    });
     let plain = |(name, own): (&String, &Estimate)| {
         format!("{name} is {}", with_interval(own.value, own.ci95, &own.unit))
     };
-    finding.parameters.iter().map(plain).collect()
+    shape.into_iter().chain(finding.parameters.iter().map(plain)).collect()
 }
 
 /// The phrase with its parameters filled in; `None` if the finding lacks one.
@@ -107,35 +111,8 @@ fn conversion(unit: &str) -> (f64, &str) {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
-    use pleiad_mismatch::{HeldOut, Place};
-
+    use super::super::fixture::finding;
     use super::*;
-
-    fn finding(effect: &str, parameters: &[(&str, f64, [f64; 2], &str)]) -> Finding {
-        let estimate = |(name, value, ci95, unit): &(&str, f64, [f64; 2], &str)| {
-            ((*name).to_owned(), Estimate { value: *value, unit: (*unit).to_owned(), ci95: *ci95 })
-        };
-        Finding {
-            verdict: Verdict::Named,
-            robots: vec![2],
-            stage: "wheel".into(),
-            channel: "body".into(),
-            effect: Some(effect.into()),
-            expression: None,
-            expression_units: None,
-            support_set: vec![effect.into()],
-            parameters: parameters.iter().map(estimate).collect::<BTreeMap<_, _>>(),
-            place: Place::default(),
-            p_familywise: 1e-6,
-            held_out: HeldOut::default(),
-            manoeuvre: None,
-            summary: String::new(),
-            equation: None,
-            configuration: String::new(),
-        }
-    }
 
     #[test]
     fn estimates_are_told_in_units_that_people_read() {
@@ -176,6 +153,18 @@ mod tests {
     fn an_effect_without_a_phrase_is_told_by_its_parameters() {
         let other = finding("something_new", &[("c", 2.0, [1.0, 3.0], "1/m")]);
         assert_eq!(sentences(&other), ["c is 2.0 1/m (1.0..3.0 1/m)"]);
+    }
+
+    #[test]
+    fn what_has_no_name_is_told_by_its_shape() {
+        let mut other = finding("x", &[("coefficient", 2.0, [1.0, 3.0], "s")]);
+        other.effect = None;
+        other.expression = Some("v |w|".into());
+        other.expression_units = Some("s".into());
+        assert_eq!(
+            sentences(&other),
+            ["the shape v |w| [s] describes it", "coefficient is 2.0 s (1.0..3.0 s)"]
+        );
     }
 
     #[test]

@@ -59,3 +59,33 @@ fn lines(finding: &Finding) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{fixture, sentences};
+    use super::*;
+
+    #[test]
+    fn a_terminal_shows_each_finding_in_a_few_plain_lines_and_then_where_the_report_is() {
+        let mut findings = fixture::findings();
+        sentences::fill_summaries(&mut findings);
+        let expected = "square: named
+
+1. robot 2 (wheel): named
+   robot 2: its left and right wheels differ by 1.00 % (0.97..1.03 %), the left one larger
+   p 1.00e-6; held-out log score 40.0 ± 5.00
+
+2. robot 1 (actuator): these data cannot tell several effects apart: transport delay / actuator lag (first order)
+   robot 1: its commands take effect 50 ms (40..60 ms) later than declared
+   p 1.00e-6; held-out log score 40.0 ± 5.00
+   drive next: steps of speed, 30 s
+
+robot 2: error per 100 m 3.00 m before, 0.400 m after
+not tested (1): no steering angle was recorded
+note: square: ends early
+corrected model: out/corrected.toml
+report: out/report.html
+";
+        assert_eq!(text(&findings, Path::new("out")), expected);
+    }
+}

@@ -118,15 +118,7 @@ pub(crate) fn gain_floor(report: &DiagnoseReport, finding: &Found, evidence: &[&
     if most <= 0.0 {
         return None;
     }
-    let (x, y, cells) = grid.cells(&gained);
-    let mut figure = grid.figure(report).trace(Trace::cells(
-        "gain",
-        &x,
-        &y,
-        &cells,
-        (0.0, most),
-        "log-likelihood gained (nat)",
-    ));
+    let mut figure = grid.figure(report);
     for (robot, path) in report.paths.iter().filter(|(robot, _)| finding.robots.contains(robot)) {
         let column = |axis: usize| path.iter().map(|point| point[axis]).collect::<Vec<f64>>();
         let (x, y) = (column(0), column(1));
@@ -135,10 +127,12 @@ pub(crate) fn gain_floor(report: &DiagnoseReport, finding: &Found, evidence: &[&
         let name = format!("path of robot {robot}");
         if !kept.is_empty() {
             figure = figure.trace(
-                Trace::path(&name, &pick(&x), &pick(&y), Colour::Muted).width(0.75).opacity(0.6).unlisted(),
+                Trace::path(&name, &pick(&x), &pick(&y), Colour::Muted).width(0.5).opacity(0.3).unlisted(),
             );
         }
     }
+    let (x, y, cells) = grid.cells(&gained);
+    figure = figure.trace(Trace::cells("gain", &x, &y, &cells, (0.0, most), "log-likelihood gained (nat)"));
     if let Some([x0, x1, y0, y1]) = finding.region_m {
         let outline = [[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]];
         let column = |axis: usize| outline.iter().map(|point| point[axis]).collect::<Vec<f64>>();

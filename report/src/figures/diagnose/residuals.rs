@@ -6,11 +6,10 @@ use pleiad_estimation::RobotId;
 
 use crate::figures::robot_name;
 use crate::reports::diagnose::ResidualColumns;
-use crate::{Axis, Colour, Dash, Figure, Panel, Trace, indices_keeping_extremes};
+use crate::{Axis, Colour, Figure, Panel, Trace};
 
-/// Most points of a line in a panel: twice its pixels, so that peaks are seen and a page of many panels
-/// stays small.
-const LINE_POINTS: usize = 500;
+/// Runs that many residuals are summed up in: about as many as can be told apart in a panel.
+const RUNS: usize = 150;
 
 /// Root mean square of the residuals over their noise, `[nominal, corrected]`.
 fn spread(series: &ResidualColumns) -> [f64; 2] {
@@ -105,18 +104,36 @@ fn before_and_after(group: &[&ResidualColumns]) -> Figure {
     let mut figure = Figure::new(Axis::new("time", "s"), axis("nominal")).row(axis("corrected")).height(300);
     for (index, series) in group.iter().enumerate() {
         let colour = Colour::Series(index);
-        let nominal = thinned(&series.component, series, &series.nominal, colour);
-        let corrected = thinned(&series.component, series, &series.corrected, colour);
+        let grouped = |trace: Trace| trace.group(&series.component);
+        let below = |trace: Trace| grouped(trace).in_row(1).unlisted();
         figure = figure
-            .trace(nominal.group(&series.component))
-            .trace(corrected.in_row(1).unlisted().group(&series.component));
+            .traces(traces(series, &series.nominal, colour).into_iter().map(grouped))
+            .traces(traces(series, &series.corrected, colour).into_iter().map(below));
     }
     figure
 }
 
-fn thinned(name: &str, series: &ResidualColumns, values: &[f64], colour: Colour) -> Trace {
+/// The residuals over their noise: as they are, or the mean and the extremes of equal runs of many.
+fn traces(series: &ResidualColumns, values: &[f64], colour: Colour) -> Vec<Trace> {
     let scaled: Vec<f64> = values.iter().map(|value| value / series.sigma).collect();
-    let kept = indices_keeping_extremes(&[&scaled, &series.time_s], LINE_POINTS);
-    let pick = |column: &[f64]| kept.iter().map(|&i| column[i]).collect::<Vec<f64>>();
-    Trace::line(name, &pick(&series.time_s), &pick(&scaled), colour).width(1.0).dash(Dash::Solid)
+    let name = &series.component;
+    let length = scaled.len().min(series.time_s.len());
+    if length <= 2 * RUNS {
+        return vec![Trace::line(name, &series.time_s, &scaled, colour).width(1.25)];
+    }
+    let run = |k: usize| length * k / RUNS..length * (k + 1) / RUNS;
+    let of_runs = |column: &[f64], of: &dyn Fn(&[f64]) -> f64| -> Vec<f64> {
+        let finite =
+            |k: usize| column[run(k)].iter().copied().filter(|value| value.is_finite()).collect::<Vec<f64>>();
+        (0..RUNS).map(|k| of(&finite(k))).collect()
+    };
+    // Of nothing finite these are not finite either, which is a gap.
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let least = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let times = of_runs(&series.time_s, &mean);
+    vec![
+        Trace::band(name, &times, &of_runs(&scaled, &least), &of_runs(&scaled, &greatest), colour).unlisted(),
+        Trace::line(name, &times, &of_runs(&scaled, &mean), colour),
+    ]
 }

@@ -82,6 +82,8 @@ pub struct Found {
     pub stage: String,
     /// The channel that shows it most, for people.
     pub channel: String,
+    /// The name in the catalogue, where it has one.
+    pub effect: Option<String>,
     /// What it is, in a few words: `unequal wheel diameters`; an expression if it has no name.
     pub title: String,
     /// What it amounts to, a sentence per item, with intervals.

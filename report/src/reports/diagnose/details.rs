@@ -44,7 +44,12 @@ pub(super) fn details(report: &DiagnoseReport, mut document: Document) -> Docume
 fn evidence(index: usize, finding: &Found, report: &DiagnoseReport, mut document: Document) -> Document {
     document = document.section(format!("Finding {}", heading(index + 1, finding, &report.robots)));
     if let Some(equation) = &finding.equation {
-        document = document.prose(format!("Model: `{equation}`. It shows most in {}.", finding.channel));
+        let more = finding
+            .effect
+            .as_ref()
+            .map_or(String::new(), |effect| format!(" More on it: `pleiad effects {effect}`."));
+        document =
+            document.prose(format!("Model: `{equation}`. It shows most in {}.{more}", finding.channel));
     }
     if !finding.parameters.is_empty() {
         document = document.table(parameters(finding));
@@ -114,7 +119,7 @@ fn residuals(report: &DiagnoseReport, mut document: Document) -> Document {
             panels,
             format!(
                 "{}: residuals over time in units of their noise, under the nominal model (above) and the corrected one \
-                 (below). Thinned for drawing; every peak is kept.",
+                 (below). Of many, the line is the mean of short runs and the band holds every one.",
                 super::words::capital(&channel)
             ),
         );

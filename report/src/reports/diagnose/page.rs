@@ -45,10 +45,12 @@ fn facts(report: &DiagnoseReport, document: Document) -> Document {
     } else {
         report.test_on.join(", ")
     };
+    let whole = || report.recordings.iter().map(|recording| recording.name.clone()).collect();
+    let fitted: Vec<String> = if report.fit_on.is_empty() { whole() } else { report.fit_on.clone() };
     let document = document
         .fact(which, names.join(", "))
         .fact("Robots", report.robots.len().to_string())
-        .fact("Fitted on", report.fit_on.join(", "))
+        .fact("Fitted on", fitted.join(", "))
         .fact("Tested on", tested);
     match mean_per_100_m(report) {
         Some(error) => document.fact("Error per 100 m driven", error),
