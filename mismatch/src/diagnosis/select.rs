@@ -3,15 +3,14 @@
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
-use pleiad_physics::Effect;
+use pleiad_physics::{Channel as Needed, Effect, Stage};
 
 use crate::diagnosis::candidate::{Candidate, candidates};
 use crate::diagnosis::chi_square::upper_tail;
-use crate::diagnosis::fit::{Fit, fit};
+use crate::diagnosis::fit::{Effort, Fit, fit};
 use crate::diagnosis::parallel;
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::term::{Term, Whose};
-use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::Unit;
 use crate::diagnosis::white::{Step, White, step};
 
@@ -23,8 +22,8 @@ const LEAST_GAIN: f64 = 20.0;
 const PRUNE: f64 = 1e-4;
 /// So many rivals are fitted before one is chosen.
 const RIVALS: usize = 8;
-/// The most terms of a robot.
-const MOST_TERMS: usize = 12;
+/// The most rounds of additions.
+const MOST_ROUNDS: usize = 24;
 /// A step from "off" to a start is a sound guess if the data want between these multiples of it.
 const SOUND_STEP: std::ops::RangeInclusive<f64> = 0.2..=4.0;
 
@@ -49,35 +48,42 @@ pub(crate) struct Selected {
 
 /// Adds effects from `entries` as long as one is significant; prunes.
 pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry]) -> Option<Selected> {
-    let mut current = fit(units, Vec::new(), &|_| true, None)?;
+    let mut current = fit(units, Vec::new(), &|_| true, Effort::FULL)?;
     let mut pool = Pool::default();
     let mut tests = 0;
-    for _ in 0..MOST_TERMS {
+    for _ in 0..MOST_ROUNDS {
         let scored = pool.scored(units, entries, &current);
         tests = tests.max(scored.len());
         let whites = whites(units, &current);
         let added = additions(units, &whites, &current, &scored, tests);
         if added.is_empty() {
-            break;
+            // Nothing by linearizations that may be stale: once more by fresh ones.
+            if pool.is_fresh(&current.terms) {
+                break;
+            }
+            pool = Pool::default();
+            continue;
         }
+        pool.forget(&added);
         let mut terms = current.terms.clone();
         terms.extend(added);
-        current = fit(units, terms, &|_| true, None)?;
-        pool.forget(&current.terms);
+        current = fit(units, terms, &|_| true, Effort::FULL)?;
     }
     let fit = prune(units, current)?;
     Some(Selected { fit, tests })
 }
 
-/// Linearized candidates, kept as long as no term is added that shows in the same channels.
+/// Linearized candidates. What is linear enough is kept when terms are added: it serves to choose whom to fit.
 #[derive(Default)]
-struct Pool {
+pub(crate) struct Pool {
     known: BTreeMap<Entry, Vec<Candidate>>,
-    terms: usize,
+    /// How many terms there were when the oldest of them was linearized.
+    terms: Option<usize>,
 }
 
 impl Pool {
-    fn scored(&mut self, units: &[&Unit<'_>], entries: &[Entry], current: &Fit) -> Vec<Scored> {
+    /// Every candidate of the entries that are not among the terms of a fit, scored.
+    pub(crate) fn scored(&mut self, units: &[&Unit<'_>], entries: &[Entry], current: &Fit) -> Vec<Scored> {
         let open: Vec<Entry> = entries
             .iter()
             .copied()
@@ -90,26 +96,35 @@ impl Pool {
         let found = parallel::map(&missing, |&(effect, whose)| {
             candidates(effect, whose, units, &current.terms, &current.states)
         });
+        if self.known.is_empty() {
+            self.terms = Some(current.terms.len());
+        }
         self.known.extend(missing.into_iter().zip(found));
         let whites: Vec<White<'_, '_>> = whites(units, current);
         let scores = parallel::map(&open, |entry| {
-            self.known[entry].iter().filter_map(|candidate| score(units, &whites, candidate)).collect::<Vec<_>>()
+            self.known[entry]
+                .iter()
+                .filter_map(|candidate| score(units, &whites, candidate))
+                .collect::<Vec<_>>()
         });
         scores.into_iter().flatten().collect()
     }
 
-    /// Forgets what the terms added last have changed.
-    fn forget(&mut self, terms: &[Term]) {
-        let added = &terms[self.terms.min(terms.len())..];
+    /// Whether every candidate was linearized beside these terms.
+    fn is_fresh(&self, terms: &[Term]) -> bool {
+        self.terms == Some(terms.len())
+    }
+
+    /// Forgets candidates that added terms have changed much: a servo that answers otherwise or later moves
+    /// every effect between command and wheel in time.
+    fn forget(&mut self, added: &[Term]) {
         self.known.retain(|&(effect, whose), _| {
             !added.iter().any(|term| {
                 overlap(term.whose, whose)
-                    && crate::channel::Channel::ALL.iter().any(|&channel| {
-                        touches(effect, channel) && touches(term.effect, channel)
-                    })
+                    && term.effect.info().stage == Stage::Actuator
+                    && effect.info().channels.contains(&Needed::Command)
             })
         });
-        self.terms = terms.len();
     }
 }
 
@@ -250,7 +265,7 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
     // What other robots share stays where it is.
     let movable: Vec<bool> =
         terms.iter().map(|term| whose == Whose::Everyone || term.whose == whose).collect();
-    fit(&acting, terms, &|index| movable[index], None)
+    fit(&acting, terms, &|index| movable[index], Effort::RIVAL)
 }
 
 /// Bayes' information criterion on the effective sample size; more is better.
@@ -305,20 +320,9 @@ fn prune(units: &[&Unit<'_>], mut current: Fit) -> Option<Fit> {
             Some((p, term)) if p > PRUNE => {
                 let mut terms = current.terms.clone();
                 terms.remove(term);
-                current = fit(units, terms, &|_| true, None)?;
+                current = fit(units, terms, &|_| true, Effort::FULL)?;
             }
             _ => return Some(current),
         }
     }
-}
-
-/// Candidates of an entry beside a fit.
-pub(crate) fn linearized_beside(units: &[&Unit<'_>], fit: &Fit, (effect, whose): Entry) -> Vec<Candidate> {
-    candidates(effect, whose, units, &fit.terms, &fit.states)
-}
-
-/// Every candidate of the entries beside a fit, scored.
-pub(crate) fn scored_beside(units: &[&Unit<'_>], fit: &Fit, entries: &[Entry]) -> Vec<Scored> {
-    let mut pool = Pool::default();
-    pool.scored(units, entries, fit)
 }
