@@ -26,7 +26,7 @@ type Sums = Vec<[f64; 3]>;
 
 /// The roll-outs of a finding's robots: nominal, refitted without it, corrected.
 pub(crate) fn of_finding(roller: &Roller<'_, '_>, own: &Judgement, kept: &[Term]) -> Vec<RollOut> {
-    let term = &own.judged.estimated.term;
+    let term = &own.judged.estimated[0].term;
     let units: Vec<&Unit<'_>> = own.support.units.iter().map(|&unit| roller.units[unit]).collect();
     rolled(roller, &units, kept, Some(term.effect))
 }

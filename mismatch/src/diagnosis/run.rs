@@ -4,16 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DMatrix;
 use pleiad_estimation::RobotId;
-use pleiad_physics::{Effect, Floors, RobotModel};
+use pleiad_physics::{Floors, RobotModel};
 use pleiad_recording::Recording;
 
 use crate::builtin;
 use crate::diagnose::{DiagnoseOptions, Diagnosis, TruthUse};
 use crate::diagnosis::corrected;
 use crate::diagnosis::entries::{Entries, entries};
-use crate::diagnosis::fit::{Fit, State, states};
+use crate::diagnosis::fit::{Effort, Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
-use crate::diagnosis::naming::{Estimated, Judged, disguise, judge};
+use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, is_unseen, judge, twin};
 use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Roller};
@@ -24,7 +24,7 @@ use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
-use crate::findings::{Finding, Findings, HeldOut, Verdict};
+use crate::findings::{Estimate, Finding, Findings, HeldOut, Verdict};
 
 /// The spread of a uniform distribution of length one.
 const UNIFORM_SIGMA: f64 = 0.288_675_134_594_812_9;
@@ -39,7 +39,8 @@ pub(crate) struct Prepared<'a> {
 
 /// A term that was judged, with what it was judged by.
 pub(crate) struct Judgement {
-    pub(crate) position: usize,
+    /// The positions of its terms in the fit.
+    pub(crate) group: Vec<usize>,
     pub(crate) support: Support,
     pub(crate) judged: Judged,
     pub(crate) gain: Gain,
@@ -71,9 +72,9 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
 
     let mut notes = notes(&prepared, &all);
     let selected = select(&units, &entries.entries);
-    let (fit, count) = match selected {
-        Some(selected) => (selected.fit, selected.tests),
-        None => return Ok(nothing(&prepared, entries, notes, units.is_empty())),
+    let Some((fit, count)) = selected.and_then(|selected| Some((paired(&units, selected.fit)?, selected.tests)))
+    else {
+        return Ok(nothing(&prepared, entries, notes, units.is_empty()));
     };
     let covariance =
         covariance(&units, &fit).unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
@@ -82,7 +83,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
-        let both = [first, second].map(|term| found.iter().any(|own| own.position == term));
+        let both = [first, second].map(|term| found.iter().any(|own| own.group.contains(&term)));
         if both == [true, true] {
             notes.push(format!(
                 "{} together with {} cannot be told from {} by any data: they move the robot alike",
@@ -97,14 +98,14 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         found
             .iter()
             .filter(|own| own.judged.one_off)
-            .map(|own| format!("{} happened once and could not be cross-validated", own.judged.estimated.term.effect.name())),
+            .map(|own| format!("{} happened once and could not be cross-validated", own.name())),
     );
 
     let roller = Roller { prepared: &prepared, units: &units, tests: &tests };
     let findings: Vec<Finding> =
-        parallel::map(&found, |own| finding(&units, &roller, &fit, &judgements, own, &entries));
+        parallel::map(&found, |own| finding(&units, &roller, &fit, &judgements, own));
     let undetected = undetected(&units, &pool, count);
-    let kept: Vec<Term> = found.iter().map(|own| fit.terms[own.position].clone()).collect();
+    let kept = kept(&fit, &judgements);
     let corrected_terms: Vec<&Judged> = found.iter().map(|own| &own.judged).collect();
     let names = |tested: bool| -> Vec<String> {
         prepared.iter().filter(|own| own.tested == tested).map(|own| own.recording.name.clone()).collect()
@@ -194,17 +195,16 @@ fn judgements(
     count: usize,
 ) -> Vec<Judgement> {
     let mut all = Vec::new();
-    for position in 0..fit.terms.len() {
-        let Some(support) = support(units, fit, position, pool) else { continue };
+    for group in groups(units, &fit.terms) {
+        let Some(support) = support(units, fit, &group, pool) else { continue };
         let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
         let gain = if tests.is_empty() {
             cross_fitted(&acting, &support.with, &support.without)
         } else {
-            on_tests(tests, &fit.terms[position], &support)
+            on_tests(tests, &fit.terms[group[0]], &support)
         };
-        let estimated = Estimated::of(fit, covariance, position);
-        let judged = judge(units, &support, estimated, (fit, covariance, position), gain, count);
-        all.push(Judgement { position, support, judged, gain });
+        let judged = judge(units, &support, (fit, covariance, &group), gain, count);
+        all.push(Judgement { group, support, judged, gain });
     }
     all
 }
@@ -228,14 +228,12 @@ fn ordered(judgements: &[Judgement]) -> Vec<&Judgement> {
 
 /// Says what was significant and is no finding.
 fn nuisance(own: &Judgement) -> String {
-    let term = &own.judged.estimated.term;
+    let term = &own.judged.estimated[0].term;
     let whose = match term.whose {
         Whose::Robot(robot) => format!("robot {robot}"),
         Whose::Everyone => "all robots".to_owned(),
     };
     let values: Vec<String> = own
-        .judged
-        .estimated
         .parameters()
         .into_iter()
         .map(|(label, estimate)| format!("{label} = {:.3e} {}", estimate.value, estimate.unit))
@@ -253,34 +251,28 @@ fn finding(
     fit: &Fit,
     judgements: &[Judgement],
     own: &Judgement,
-    entries: &Entries,
 ) -> Finding {
-    let term = &own.judged.estimated.term;
-    let info = term.effect.info();
+    let info = own.judged.estimated[0].term.effect.info();
     let robots: BTreeSet<u32> =
         own.support.units.iter().map(|&unit| units[unit].robot.0).collect();
+    let robots: Vec<u32> = robots.into_iter().collect();
     let mut support_set: Vec<String> =
         own.support.members.iter().map(|effect| effect.name().to_owned()).collect();
     support_set.dedup();
     let verdict = own.judged.verdict.unwrap_or(Verdict::CannotTell);
-    let rivals: Vec<Effect> = own.support.members.iter().skip(1).copied().collect();
-    let _ = entries;
-    let manoeuvre = (!rivals.is_empty()).then(|| info.broken_by.to_owned());
-    let kept: Vec<Term> = judgements
-        .iter()
-        .filter(|other| other.judged.verdict.is_some())
-        .map(|other| fit.terms[other.position].clone())
-        .collect();
+    let manoeuvre = (verdict == Verdict::CannotTell).then(|| info.broken_by.to_owned());
+    let kept = kept(fit, judgements);
     Finding {
         verdict,
-        robots: robots.into_iter().collect(),
+        configuration: corrected::sections(&robots, &own.judged.estimated),
+        robots,
         stage: info.stage.name().to_owned(),
         channel: own.judged.channel.name().to_owned(),
         effect: Some(info.name.to_owned()),
         expression: None,
         expression_units: None,
         support_set,
-        parameters: own.judged.estimated.parameters(),
+        parameters: own.parameters(),
         place: own.judged.place.clone(),
         p_familywise: own.judged.p_familywise,
         held_out: HeldOut {
@@ -291,8 +283,43 @@ fn finding(
         manoeuvre,
         summary: info.summary.to_owned(),
         equation: Some(info.equation.to_owned()),
-        configuration: corrected::section(&own.judged.estimated),
     }
+}
+
+impl Judgement {
+    fn name(&self) -> &'static str {
+        self.judged.estimated[0].term.effect.name()
+    }
+
+    fn parameters(&self) -> BTreeMap<String, Estimate> {
+        let mut all: BTreeMap<String, Estimate> =
+            self.judged.estimated.iter().flat_map(Estimated::parameters).collect();
+        all.extend(self.judged.total.clone());
+        all
+    }
+}
+
+/// The terms of findings.
+fn kept(fit: &Fit, judgements: &[Judgement]) -> Vec<Term> {
+    let found = judgements.iter().filter(|own| own.judged.verdict.is_some());
+    found.flat_map(|own| own.group.iter().map(|&term| fit.terms[term].clone())).collect()
+}
+
+/// Where lag or delay was found without encoders, both are fitted: only their sum is well known.
+fn paired(units: &[&Unit<'_>], fit: Fit) -> Option<Fit> {
+    let mut terms = fit.terms.clone();
+    for term in &fit.terms {
+        let Some(twin) = twin(term.effect) else { continue };
+        let known = fit.terms.iter().any(|other| other.effect == twin && other.whose == term.whose);
+        if !known && is_unseen(units, term) {
+            let off = twin.info().parameters.iter().map(|parameter| parameter.off).collect();
+            terms.push(Term::new(twin, term.whose, off));
+        }
+    }
+    if terms.len() == fit.terms.len() {
+        return Some(fit);
+    }
+    crate::diagnosis::fit::fit(units, terms, &|_| true, Effort::FULL)
 }
 
 fn overall(findings: &[Finding], units: &[&Unit<'_>]) -> Verdict {

@@ -331,19 +331,26 @@ pub(crate) fn covariance(units: &[&Unit<'_>], fit: &Fit) -> Option<DMatrix<f64>>
     Some(step(&bare, &columns)?.covariance)
 }
 
-/// The Wald statistic of a term and its degrees of freedom.
-pub(crate) fn wald(fit: &Fit, covariance: &DMatrix<f64>, term: usize) -> Option<(f64, usize)> {
-    let own: Vec<usize> = (0..fit.slots.len()).filter(|&slot| fit.slots[slot].0 == term).collect();
-    let parameters = fit.terms[term].parameters();
-    // A term whose size shows in no derivative, such as an onset, cannot be tested this way.
-    let own: Vec<usize> = own.into_iter().filter(|&slot| parameters[fit.slots[slot].1].off.is_finite()).collect();
+/// The Wald statistic of terms and its degrees of freedom.
+pub(crate) fn wald(fit: &Fit, covariance: &DMatrix<f64>, terms: &[usize]) -> Option<(f64, usize)> {
+    let parameter = |slot: usize| {
+        let (term, parameter) = fit.slots[slot];
+        (fit.terms[term].values[parameter], &fit.terms[term].parameters()[parameter])
+    };
+    // A parameter that is off at infinity, or only shapes an effect, says nothing of its presence.
+    let says = |slot: &usize| {
+        let (_, parameter) = parameter(*slot);
+        parameter.off.is_finite() && (parameter.off == 0.0 || fit.slots.len() == 1)
+    };
+    let own: Vec<usize> =
+        (0..fit.slots.len()).filter(|&slot| terms.contains(&fit.slots[slot].0)).filter(says).collect();
     if own.is_empty() {
         return None;
     }
     let part = DMatrix::from_fn(own.len(), own.len(), |i, j| covariance[(own[i], own[j])]);
     let value = |slot: usize| {
-        let (term, parameter) = fit.slots[slot];
-        fit.terms[term].values[parameter] - parameters[parameter].off
+        let (value, parameter) = parameter(slot);
+        value - parameter.off
     };
     let values = nalgebra::DVector::from_fn(own.len(), |i, _| value(own[i]));
     Some((values.dot(&part.cholesky()?.solve(&values)), own.len()))
@@ -355,7 +362,7 @@ fn prune(units: &[&Unit<'_>], mut current: Fit) -> Option<Fit> {
         let Some(covariance) = covariance(units, &current) else { return Some(current) };
         let weakest = (0..current.terms.len())
             .filter_map(|term| {
-                let (wald, count) = wald(&current, &covariance, term)?;
+                let (wald, count) = wald(&current, &covariance, &[term])?;
                 Some((upper_tail(wald, count), term))
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));

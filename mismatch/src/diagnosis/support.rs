@@ -20,49 +20,50 @@ const RIVALS: usize = 8;
 /// A rival that gains less than this share by linearization does not explain it.
 const LEAST_SHARE: f64 = 0.5;
 
-/// A finding with and without its term, on the units that it acts on.
+/// A finding with and without its terms, on the units that they act on.
 pub(crate) struct Support {
     /// The positions of the units.
     pub(crate) units: Vec<usize>,
-    /// Everything but the term, fitted again.
+    /// Everything but the terms, fitted again.
     pub(crate) without: Fit,
-    /// With the term.
+    /// With the terms.
     pub(crate) with: Fit,
-    /// The position of the term in `with`.
-    pub(crate) term: usize,
     /// Effects that explain it about equally, the term's own first.
     pub(crate) members: Vec<Effect>,
     /// Variance of scores over that of independent errors, at least 1.
     pub(crate) inflation: f64,
 }
 
-/// Looks for rivals of a term of a fit among candidates that were scored beside that fit.
-pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, term: usize, pool: &[Scored]) -> Option<Support> {
-    let chosen = &full.terms[term];
+/// Looks for rivals of terms of one robot, or of everyone, among candidates that were scored beside the fit.
+pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &[Scored]) -> Option<Support> {
+    let chosen = &full.terms[*group.first()?];
     let own: Vec<usize> = (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
     let acting: Vec<&Unit<'_>> = own.iter().map(|&unit| units[unit]).collect();
     let others: Vec<Term> = full
         .terms
         .iter()
         .enumerate()
-        .filter(|(index, other)| *index != term && overlap(other.whose, chosen.whose))
+        .filter(|(index, other)| !group.contains(index) && overlap(other.whose, chosen.whose))
         .map(|(_, other)| other.clone())
         .collect();
     // What other robots share with this one stays where it is.
     let movable: Vec<bool> = others.iter().map(|other| other.whose == chosen.whose).collect();
+    let count = others.len();
     let without = fit(&acting, others, &|index| movable[index], Effort::RIVAL)?;
-    let with = fit_beside(&acting, &without, chosen.clone())?;
-    let position = with.terms.len() - 1;
+    let mut with = without.clone();
+    for &term in group {
+        with = fit_beside(&acting, &with, full.terms[term].clone())?;
+    }
 
     let whites = whites(&acting, &without);
-    let mine: Vec<usize> =
-        (0..with.slots.len()).filter(|&slot| with.slots[slot].0 == position).collect();
+    let mine: Vec<usize> = (0..with.slots.len()).filter(|&slot| with.slots[slot].0 >= count).collect();
     let columns: Vec<Vec<Column>> = with
         .columns
         .iter()
         .map(|columns| mine.iter().map(|&slot| columns[slot].clone()).collect())
         .collect();
-    let own_step = step(&whites.iter().collect::<Vec<_>>(), &columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    let own_step =
+        step(&whites.iter().collect::<Vec<_>>(), &columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
     let inflation = own_step.as_ref().map_or(1.0, |own| own.inflation.max(1.0));
     let own_gain = own_step.map_or(0.0, |own| own.gain);
 
@@ -82,13 +83,22 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, term: usize, pool: &[Scor
     let fitted = parallel::map(&rivals, |rival| {
         let rival = refine(&acting, &whites, rival);
         let fit = fit_beside(&acting, &without, rival.term())?;
+        let lost = |to: &Fit| 2.0 * (to.log_likelihood - fit.log_likelihood) / inflation;
         // A rival of more parameters that does no better is the finding in disguise.
-        let lost = 2.0 * (with.log_likelihood - fit.log_likelihood) / inflation;
-        (lost < ODDS && fit.slots.len() <= size).then_some(rival.candidate.term.effect)
+        if lost(&with) > ODDS || fit.slots.len() > size {
+            return None;
+        }
+        // It has to explain the same: beside a rival the finding is not needed. Another effect that also
+        // acts is no rival.
+        let mut both = fit.clone();
+        for &term in group {
+            both = fit_beside(&acting, &both, full.terms[term].clone())?;
+        }
+        (lost(&both) < ODDS).then_some(rival.candidate.term.effect)
     });
-    let mut members = vec![chosen.effect];
+    let mut members: Vec<Effect> = group.iter().map(|&term| full.terms[term].effect).collect();
     members.extend(fitted.into_iter().flatten());
-    Some(Support { units: own, without, with, term: position, members, inflation })
+    Some(Support { units: own, without, with, members, inflation })
 }
 
 /// The candidates that act on the same robots, with the units numbered as those that act.
