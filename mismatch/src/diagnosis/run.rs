@@ -19,6 +19,7 @@ use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Roller};
 use crate::diagnosis::select::{covariance, scored_beside, select};
 use crate::diagnosis::series;
+use crate::diagnosis::spread::{self, SpreadTerm};
 use crate::diagnosis::support::{Support, support};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
@@ -67,17 +68,20 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         all.iter().filter(|unit| !prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
-    let entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let mut entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let spread_entries = spread::take(&mut entries.entries);
 
     let mut notes = notes(&prepared, &all);
     let selected = select(&units, &entries.entries);
     let (fit, count) = match selected {
-        Some(selected) => (selected.fit, selected.tests),
+        Some(selected) => (selected.fit, selected.tests + spread_entries.len()),
         None => return Ok(nothing(&prepared, entries, notes, units.is_empty())),
     };
     let covariance =
         covariance(&units, &fit).unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
-    let judgements = judgements(&units, &tests, &fit, &covariance, &entries, count);
+    let mut judgements = judgements(&units, &tests, &fit, &covariance, &entries, count);
+    let spread = spread::spread(&units, &fit, &spread_entries, count);
+    spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
@@ -91,7 +95,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
             ));
         }
     }
-    notes.extend(judgements.iter().filter(|own| own.judged.verdict.is_none()).map(nuisance));
+    notes.extend(judgements.iter().filter(|own| own.judged.verdict.is_none()).map(|own| nuisance(&own.judged)));
+    notes.extend(spread.nuisances());
     notes.extend(
         found
             .iter()
@@ -100,14 +105,18 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     );
 
     let roller = Roller { prepared: &prepared, units: &units, tests: &tests };
-    let findings: Vec<Finding> =
+    let mut findings: Vec<Finding> =
         parallel::map(&found, |own| finding(&units, &roller, &fit, &judgements, own, &entries));
-    let undetected = {
+    findings.extend(spread.found().into_iter().map(SpreadTerm::finding));
+    let mut undetected = {
         let scored = scored_beside(&units, &fit, &entries.entries);
         undetected(&units, &scored, count)
     };
+    undetected.extend_from_slice(&spread.undetected);
+    entries.untestable.extend_from_slice(&spread.untestable);
     let kept: Vec<Term> = found.iter().map(|own| fit.terms[own.position].clone()).collect();
-    let corrected_terms: Vec<&Judged> = found.iter().map(|own| &own.judged).collect();
+    let corrected_terms: Vec<&Judged> =
+        found.iter().map(|own| &own.judged).chain(spread.found().into_iter().map(|own| &own.judged)).collect();
     let names = |tested: bool| -> Vec<String> {
         prepared.iter().filter(|own| own.tested == tested).map(|own| own.recording.name.clone()).collect()
     };
@@ -229,14 +238,13 @@ fn ordered(judgements: &[Judgement]) -> Vec<&Judgement> {
 }
 
 /// Says what was significant and is no finding.
-fn nuisance(own: &Judgement) -> String {
-    let term = &own.judged.estimated.term;
+pub(crate) fn nuisance(judged: &Judged) -> String {
+    let term = &judged.estimated.term;
     let whose = match term.whose {
         Whose::Robot(robot) => format!("robot {robot}"),
         Whose::Everyone => "all robots".to_owned(),
     };
-    let values: Vec<String> = own
-        .judged
+    let values: Vec<String> = judged
         .estimated
         .parameters()
         .into_iter()
