@@ -42,8 +42,10 @@ impl Track {
     /// Reckons by the encoders with the declared geometry, or without encoders by the velocities: over the
     /// few milliseconds that truth is carried, their errors do not matter.
     pub(crate) fn new(recording: &RobotRecording, model: &RobotModel<f64>, origin: Timestamp) -> Self {
-        let encoders: Vec<_> =
+        let mut encoders: Vec<_> =
             recording.odometry.iter().filter_map(|sample| encoder_sample(sample, origin)).collect();
+        let steer = recording.steer.iter().map(|own| (own.time.seconds_since(origin), own.angle_rad));
+        steer_wheels(&mut encoders, &steer.collect::<Vec<_>>());
         let ratio = match model.drive {
             Drive::SkidSteer { track_ratio } => track_ratio,
             Drive::Differential | Drive::CarLike { .. } => 1.0,
@@ -119,7 +121,8 @@ impl Track {
         let angle = |wheel: usize| {
             before.angle_rad[wheel] + share * (next.angle_rad[wheel] - before.angle_rad[wheel])
         };
-        (step_s <= self.pause_s).then(|| EncoderSample { time_s, angle_rad: [angle(0), angle(1)] })
+        let steer_rad = before.steer_rad + share * (next.steer_rad - before.steer_rad);
+        (step_s <= self.pause_s).then(|| EncoderSample { time_s, angle_rad: [angle(0), angle(1)], steer_rad })
     }
 
     fn reckoned_at(&self, time_s: f64) -> Option<Reckoned> {
@@ -181,8 +184,25 @@ fn encoder_sample(sample: &Sample, origin: Timestamp) -> Option<EncoderSample> {
         Reading::Wheels { left_rad, right_rad } => Some(EncoderSample {
             time_s: sample.time.seconds_since(origin),
             angle_rad: [left_rad, right_rad],
+            steer_rad: 0.0,
         }),
         _ => None,
+    }
+}
+
+/// Gives every sample of the wheels its steering angle: interpolated between `(time, angle)`, and beyond the
+/// ends the nearest.
+fn steer_wheels(encoders: &mut [EncoderSample], steer: &[(f64, f64)]) {
+    for sample in encoders {
+        let after = steer.partition_point(|(time_s, _)| *time_s <= sample.time_s);
+        let before = after.checked_sub(1).and_then(|index| steer.get(index));
+        sample.steer_rad = match (before, steer.get(after)) {
+            (Some((from_s, from)), Some((to_s, to))) => {
+                from + (to - from) * (sample.time_s - from_s) / (to_s - from_s)
+            }
+            (Some((_, only)), None) | (None, Some((_, only))) => *only,
+            (None, None) => 0.0,
+        };
     }
 }
 

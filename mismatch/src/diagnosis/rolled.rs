@@ -3,7 +3,7 @@
 
 use pleiad_physics::{Effect, RobotModel};
 
-use crate::diagnosis::fit::{Fit, fit};
+use crate::diagnosis::fit::{Effort, Fit, fit};
 use crate::diagnosis::held_out::{FOLDS, fold, left_out};
 use crate::diagnosis::run::{Judgement, Prepared};
 use crate::diagnosis::term::{Term, Whose};
@@ -71,9 +71,10 @@ fn rolled(roller: &Roller<'_, '_>, units: &[&Unit<'_>], kept: &[Term], without: 
                 Term::new(effect, Whose::Robot(robot), off)
             })
             .collect();
-        let refit = fit(&own, refitted, &|_| true, None);
+        let refit = fit(&own, refitted, &|_| true, Effort::RIVAL);
         let mine: Vec<Term> = kept.iter().filter(|term| term.acts_on(robot)).cloned().collect();
-        let corrected = fit(&own, mine, &|_| false, None);
+        let movable: Vec<bool> = mine.iter().map(|term| term.whose == Whose::Robot(robot)).collect();
+        let corrected = fit(&own, mine, &|index| movable[index], Effort::RIVAL);
         let (Some(refit), Some(corrected)) = (refit, corrected) else { continue };
         let tests: Vec<&Unit<'_>> = roller.tests.iter().copied().filter(|unit| unit.robot == robot).collect();
         for unit in if tests.is_empty() { &own } else { &tests } {

@@ -17,7 +17,7 @@ use crate::diagnosis::naming::{Estimated, Judged, disguise, judge};
 use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Roller};
-use crate::diagnosis::select::{covariance, scored_beside, select};
+use crate::diagnosis::select::{Pool, Scored, covariance, select};
 use crate::diagnosis::series;
 use crate::diagnosis::spread::{self, SpreadTerm};
 use crate::diagnosis::support::{Support, support};
@@ -79,7 +79,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     };
     let covariance =
         covariance(&units, &fit).unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
-    let mut judgements = judgements(&units, &tests, &fit, &covariance, &entries, count);
+    let pool = Pool::default().scored(&units, &entries.entries, &fit);
+    let mut judgements = judgements(&units, &tests, &fit, &covariance, &pool, count);
     let spread = spread::spread(&units, &fit, &spread_entries, count);
     spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
@@ -108,10 +109,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let mut findings: Vec<Finding> =
         parallel::map(&found, |own| finding(&units, &roller, &fit, &judgements, own, &entries));
     findings.extend(spread.found().into_iter().map(SpreadTerm::finding));
-    let mut undetected = {
-        let scored = scored_beside(&units, &fit, &entries.entries);
-        undetected(&units, &scored, count)
-    };
+    let mut undetected = undetected(&units, &pool, count);
     undetected.extend_from_slice(&spread.undetected);
     entries.untestable.extend_from_slice(&spread.untestable);
     let kept: Vec<Term> = found.iter().map(|own| fit.terms[own.position].clone()).collect();
@@ -201,12 +199,12 @@ fn judgements(
     tests: &[&Unit<'_>],
     fit: &Fit,
     covariance: &DMatrix<f64>,
-    entries: &Entries,
+    pool: &[Scored],
     count: usize,
 ) -> Vec<Judgement> {
     let mut all = Vec::new();
     for position in 0..fit.terms.len() {
-        let Some(support) = support(units, fit, position, &entries.entries) else { continue };
+        let Some(support) = support(units, fit, position, pool) else { continue };
         let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
         let gain = if tests.is_empty() {
             cross_fitted(&acting, &support.with, &support.without)

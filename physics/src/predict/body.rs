@@ -21,6 +21,8 @@ pub struct EncoderSample {
     pub time_s: f64,
     /// Left and right, radians.
     pub angle_rad: [f64; 2],
+    /// Steering angle, radians, left positive; 0 unless car-like.
+    pub steer_rad: f64,
 }
 
 /// Encoder samples from the beginning to the end of a window.
@@ -31,7 +33,7 @@ pub struct BodyWindow<'a> {
     /// `map_from_robot` at the beginning, for effects that depend on heading or place: from truth, or from
     /// the filter.
     pub start: Pose<f64>,
-    /// Steering angle, neighbours.
+    /// Neighbours; the steering angle is that of the samples.
     pub surroundings: Surroundings,
 }
 
@@ -70,8 +72,9 @@ fn roll_out<S: Scalar>(
         }
         motion.wheel_angle_rad = pair[0].angle_rad.map(S::constant);
         let turned = [0, 1].map(|wheel| S::constant(pair[1].angle_rad[wheel] - pair[0].angle_rad[wheel]));
+        let steer_rad = f64::midpoint(pair[0].steer_rad, pair[1].steer_rad);
         let context = Context {
-            surroundings: window.surroundings,
+            surroundings: Surroundings { steer_rad, ..window.surroundings },
             ..Context::new(&model.nominal, pair[0].time_s, motion).over(S::constant(step_s))
         };
         let step = advance(model, &context, turned, state);
@@ -193,7 +196,8 @@ mod tests {
         // Radius 0.05 m, track 0.3 m: 0.5 m/s and 1 rad/s.
         std::array::from_fn(|i| {
             let time_s = 0.1 * i as f64;
-            EncoderSample { time_s, angle_rad: [(0.5 - 0.15) / 0.05 * time_s, (0.5 + 0.15) / 0.05 * time_s] }
+            let angle_rad = [(0.5 - 0.15) / 0.05 * time_s, (0.5 + 0.15) / 0.05 * time_s];
+            EncoderSample { time_s, angle_rad, steer_rad: 0.0 }
         })
     }
 

@@ -80,7 +80,7 @@ fn encoders() -> Vec<EncoderSample> {
     let mut angle_rad = [0.0; 2];
     let mut samples = Vec::new();
     for time_s in instants(180, 0.02) {
-        samples.push(EncoderSample { time_s, angle_rad });
+        samples.push(EncoderSample { time_s, angle_rad, steer_rad: surroundings(time_s).steer_rad });
         let (speed, yaw_rate) = script(time_s);
         angle_rad[0] += (speed - 0.15 * yaw_rate) / 0.05 * 0.02;
         angle_rad[1] += (speed + 0.15 * yaw_rate) / 0.05 * 0.02;

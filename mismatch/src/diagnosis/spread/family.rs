@@ -5,6 +5,7 @@ use pleiad_physics::Effect;
 use crate::channel::Channel;
 use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::held_out::{EMBARGO_S, FOLDS, Gain, fold, summed};
+use crate::diagnosis::noise;
 use crate::diagnosis::select::{FAMILYWISE, LEAST_GAIN};
 use crate::diagnosis::spread::maximum::{Bounds, Density, Optimum, Uncertainty, maximize, uncertainty};
 use crate::diagnosis::support::ODDS;
@@ -146,6 +147,12 @@ pub(super) struct Shows {
     pub(super) rivals: Vec<Effect>,
 }
 
+/// The gain of a row, no more than what a residual of [`noise::CLIP`] sigmas costs: no instant outweighs the rest.
+fn bounded_gain(gain: f64) -> f64 {
+    let most = 0.5 * noise::CLIP * noise::CLIP;
+    gain.clamp(-most, most)
+}
+
 impl Family<'_, '_> {
     fn free(&self, active: &[usize]) -> Vec<usize> {
         let own = active.iter().flat_map(|&member| self.members[member].parameters.iter().copied());
@@ -223,7 +230,9 @@ impl Family<'_, '_> {
         }
         let departure: Vec<f64> =
             own.parameters.iter().zip(&own.off).map(|(&index, off)| with.parameters[index] - off).collect();
-        match known.wald(&own.parameters, &departure) {
+        // The error of a variance grows with it: its root is nearer to a normal distribution.
+        let sharper = if own.shown.iter().any(|shown| matches!(shown, Shown::Root(_))) { 4.0 } else { 1.0 };
+        match known.wald(&own.parameters, &departure).map(|wald| sharper * wald) {
             Some(wald) => (p.max(upper_tail(wald, own.parameters.len())), inflation),
             None => (1.0, inflation),
         }
@@ -277,14 +286,14 @@ impl Family<'_, '_> {
             self.density.fill(&self.fit(others, with, &kept).parameters, &mut low);
             for (row, place) in self.places.iter().enumerate() {
                 if fold(place).contains(&place.time_s) {
-                    sums[place.unit][blocks[row] - firsts[place.unit]] += high[row] - low[row];
+                    sums[place.unit][blocks[row] - firsts[place.unit]] += bounded_gain(high[row] - low[row]);
                 }
             }
         }
         summed(&sums)
     }
 
-    /// The channel whose rows gain most.
+    /// The channel whose rows gain most, among those in which the effect shows.
     fn channel(&self, with: &Optimum, without: &Optimum) -> Channel {
         let (mut high, mut low) = (vec![0.0; self.places.len()], vec![0.0; self.places.len()]);
         self.density.fill(&with.parameters, &mut high);
