@@ -66,6 +66,9 @@ pub(crate) struct Step {
 /// `None` if the columns say nothing that the active parameters do not.
 pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<Step> {
     let size = columns.first()?.len();
+    if size == 0 {
+        return None;
+    }
     let active = whites.first()?.active.len();
     let own: Vec<Vec<Vec<Option<Vec<f64>>>>> = whites
         .iter()
