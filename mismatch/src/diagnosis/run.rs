@@ -18,6 +18,7 @@ use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
 use crate::diagnosis::select::{Scored, Selected, select};
 use crate::diagnosis::series;
+use crate::diagnosis::spread::{self, SpreadTerm};
 use crate::diagnosis::support::{Support, support};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
@@ -67,7 +68,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         all.iter().filter(|unit| !prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
-    let entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let mut entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let spread_entries = spread::take(&mut entries.entries);
 
     let mut notes = notes(&prepared, &all);
     let selected = select(&units, &entries.entries);
@@ -77,9 +79,12 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let Some(fit) = paired(&units, fit) else {
         return Ok(nothing(&prepared, entries, notes, false));
     };
+    let count = count + spread_entries.len();
     let pool = pool.scored(&units, &entries.entries, &fit);
     let groups = groups(&units, &fit.terms);
-    let judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
+    let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
+    let spread = spread::spread(&units, &fit, &spread_entries, count);
+    spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
@@ -95,6 +100,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     }
     let named = |group: &&Vec<usize>| found.iter().any(|own| own.group == **group);
     notes.extend(groups.iter().filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
+    notes.extend(spread.nuisances());
     notes.extend(
         found
             .iter()
@@ -105,9 +111,13 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let roller = Roller { prepared: &prepared, units: &units, tests: &tests };
     let kept = kept(&fit, &judgements);
     let rolled = rolled::robots(&roller, &kept);
-    let findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
-    let undetected = undetected(&units, &pool, count);
-    let corrected_terms: Vec<&Judged> = found.iter().map(|own| &own.judged).collect();
+    let mut findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
+    findings.extend(spread.found().into_iter().map(SpreadTerm::finding));
+    let mut undetected = undetected(&units, &pool, count);
+    undetected.extend_from_slice(&spread.undetected);
+    entries.untestable.extend_from_slice(&spread.untestable);
+    let corrected_terms: Vec<&Judged> =
+        found.iter().map(|own| &own.judged).chain(spread.found().into_iter().map(|own| &own.judged)).collect();
     let names = |tested: bool| -> Vec<String> {
         prepared.iter().filter(|own| own.tested == tested).map(|own| own.recording.name.clone()).collect()
     };
@@ -228,7 +238,7 @@ fn ordered(judgements: &[Judgement]) -> Vec<&Judgement> {
 }
 
 /// Says what was significant and is no finding.
-fn nuisance(term: &Term) -> String {
+pub(crate) fn nuisance(term: &Term) -> String {
     let whose = match term.whose {
         Whose::Robot(robot) => format!("robot {robot}"),
         Whose::Everyone => "all robots".to_owned(),

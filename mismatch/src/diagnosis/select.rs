@@ -17,7 +17,7 @@ use crate::diagnosis::white::{Step, White, step};
 /// Probability that anything is found in a clean recording, over everything that is tried in it.
 pub(crate) const FAMILYWISE: f64 = 0.002;
 /// An effect enters only if it gains more than this, twice in log-likelihood.
-const LEAST_GAIN: f64 = 20.0;
+pub(crate) const LEAST_GAIN: f64 = 20.0;
 /// A term is dropped if it is this likely without the effect.
 const PRUNE: f64 = 1e-4;
 /// A rival that gains less than this share of the best one by linearization is not fitted.

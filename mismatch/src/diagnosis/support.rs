@@ -16,7 +16,7 @@ use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::step;
 
 /// A rival explains the data about equally if it loses less than this, twice in log-likelihood: odds of 20.
-const ODDS: f64 = 5.991_464_547_107_98;
+pub(crate) const ODDS: f64 = 5.991_464_547_107_98;
 /// So many rivals are fitted.
 const RIVALS: usize = 8;
 /// A rival that gains less than this share by linearization does not explain it.
