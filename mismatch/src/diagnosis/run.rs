@@ -16,7 +16,7 @@ use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, is_unseen, j
 use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
-use crate::diagnosis::select::{Scored, Selected, select};
+use crate::diagnosis::select::{Pool, Selected, select};
 use crate::diagnosis::series;
 use crate::diagnosis::spread::{self, SpreadTerm};
 use crate::diagnosis::support::{Support, support};
@@ -80,7 +80,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         return Ok(nothing(&prepared, entries, notes, false));
     };
     let count = count + spread_entries.len();
-    let pool = pool.scored(&units, &entries.entries, &fit);
+    let scored = pool.scored(&units, &entries.entries, &fit);
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
     let spread = spread::spread(&units, &fit, &spread_entries, count);
@@ -113,7 +113,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let rolled = rolled::robots(&roller, &kept);
     let mut findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
     findings.extend(spread.found().into_iter().map(SpreadTerm::finding));
-    let mut undetected = undetected(&units, &pool, count);
+    let mut undetected = undetected(&units, &scored, count);
     undetected.extend_from_slice(&spread.undetected);
     entries.untestable.extend_from_slice(&spread.untestable);
     let corrected_terms: Vec<&Judged> =
@@ -205,7 +205,7 @@ fn judgements(
     tests: &[&Unit<'_>],
     fit: &Fit,
     groups: &[Vec<usize>],
-    pool: &[Scored],
+    pool: &Pool,
     count: usize,
 ) -> Vec<Judgement> {
     let mut all = Vec::new();
