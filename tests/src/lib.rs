@@ -3,6 +3,7 @@
 pub mod architecture;
 pub mod feeder;
 pub mod folded;
+pub mod known_effects;
 pub mod program;
 pub mod stage;
 pub mod team;

@@ -150,7 +150,7 @@ fn roles(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Vec<Opti
     Ok(roles)
 }
 
-fn unit<'a>(index: usize, own: &'a Prepared<'a>, robot: RobotId, model: &RobotModel<f64>) -> Unit<'a> {
+pub(crate) fn unit<'a>(index: usize, own: &'a Prepared<'a>, robot: RobotId, model: &RobotModel<f64>) -> Unit<'a> {
     let floors = own.recording.nominal.as_ref().map_or_else(Floors::default, |nominal| Floors {
         lateral_slip_s: nominal.noise.odometry_floor_lateral_slip_s,
         sensor_lag_s: nominal.noise.gyro_floor_lag_s,

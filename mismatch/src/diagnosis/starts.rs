@@ -215,7 +215,7 @@ fn integers(least: f64, greatest: f64) -> Vec<f64> {
 }
 
 /// Evenly spaced logarithms over what is plausible.
-fn thresholds(parameter: &Parameter) -> Vec<f64> {
+pub(crate) fn thresholds(parameter: &Parameter) -> Vec<f64> {
     let greatest = parameter.plausible.1;
     let least = parameter.plausible.0.max(greatest / 300.0);
     let ratio = (greatest / least).powf(1.0 / (THRESHOLDS - 1) as f64);
