@@ -90,6 +90,11 @@ impl Estimated {
         self.term.parameters().iter().enumerate().filter_map(one).collect()
     }
 
+    /// Whether the term can be relevant to a unit at all.
+    pub(crate) fn may_be_relevant(&self, unit: &Unit<'_>) -> bool {
+        self.is_relevant(unit).unwrap_or(true)
+    }
+
     /// Whether the near end of some parameter is beyond its threshold of relevance; `None` if no parameter
     /// has one.
     fn is_relevant(&self, unit: &Unit<'_>) -> Option<bool> {
@@ -123,14 +128,8 @@ pub(crate) struct Judged {
 
 /// Judges terms that make one finding. `verdict` is `None` for a nuisance: significant, but too small, or of
 /// no use on data that it was not fitted on.
-pub(crate) fn judge(
-    units: &[&Unit<'_>],
-    support: &Support,
-    full: (&Fit, &DMatrix<f64>, &[usize]),
-    gain: Gain,
-    tests: usize,
-) -> Judged {
-    let (fit, covariance, group) = full;
+pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: usize) -> Judged {
+    let (fit, covariance, group) = (&support.with, &support.covariance, &support.group);
     let estimated: Vec<Estimated> =
         group.iter().map(|&position| Estimated::of(fit, covariance, position)).collect();
     let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();

@@ -163,7 +163,7 @@ fn best(profile: &Profile<'_, '_>, slot: Slot) -> f64 {
     let mut value = term.values[slot.1];
     let mut most = at(value);
     if !placed {
-        for other in thresholds(parameter) {
+        for other in thresholds(parameter, profile.units) {
             let there = at(other);
             if there > most {
                 (value, most) = (other, there);

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::DMatrix;
 use pleiad_estimation::RobotId;
 use pleiad_physics::{Floors, RobotModel};
 use pleiad_recording::Recording;
@@ -16,8 +15,8 @@ use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
 use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, is_unseen, judge, twin};
 use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
-use crate::diagnosis::rolled::{self, Roller};
-use crate::diagnosis::select::{Pool, Scored, covariance, select};
+use crate::diagnosis::rolled::{self, Rolled, Roller};
+use crate::diagnosis::select::{Scored, Selected, select};
 use crate::diagnosis::series;
 use crate::diagnosis::support::{Support, support};
 use crate::diagnosis::term::{Term, Whose};
@@ -72,14 +71,15 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
 
     let mut notes = notes(&prepared, &all);
     let selected = select(&units, &entries.entries);
-    let Some((fit, count)) = selected.and_then(|selected| Some((paired(&units, selected.fit)?, selected.tests)))
-    else {
+    let Some(Selected { fit, tests: count, mut pool }) = selected else {
         return Ok(nothing(&prepared, entries, notes, units.is_empty()));
     };
-    let covariance =
-        covariance(&units, &fit).unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
-    let pool = Pool::default().scored(&units, &entries.entries, &fit);
-    let judgements = judgements(&units, &tests, &fit, &covariance, &pool, count);
+    let Some(fit) = paired(&units, fit) else {
+        return Ok(nothing(&prepared, entries, notes, false));
+    };
+    let pool = pool.scored(&units, &entries.entries, &fit);
+    let groups = groups(&units, &fit.terms);
+    let judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
@@ -93,7 +93,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
             ));
         }
     }
-    notes.extend(judgements.iter().filter(|own| own.judged.verdict.is_none()).map(nuisance));
+    let named = |group: &&Vec<usize>| found.iter().any(|own| own.group == **group);
+    notes.extend(groups.iter().filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
     notes.extend(
         found
             .iter()
@@ -102,10 +103,10 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     );
 
     let roller = Roller { prepared: &prepared, units: &units, tests: &tests };
-    let findings: Vec<Finding> =
-        parallel::map(&found, |own| finding(&units, &roller, &fit, &judgements, own));
-    let undetected = undetected(&units, &pool, count);
     let kept = kept(&fit, &judgements);
+    let rolled = rolled::robots(&roller, &kept);
+    let findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
+    let undetected = undetected(&units, &pool, count);
     let corrected_terms: Vec<&Judged> = found.iter().map(|own| &own.judged).collect();
     let names = |tested: bool| -> Vec<String> {
         prepared.iter().filter(|own| own.tested == tested).map(|own| own.recording.name.clone()).collect()
@@ -118,7 +119,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         findings,
         undetected,
         untestable: entries.untestable,
-        roll_outs: rolled::per_robot(&roller, &fit, &kept),
+        roll_outs: rolled::per_robot(&rolled, &units),
         notes,
     };
     let plots = series::plots(&prepared, &units, &fit, &kept, &found);
@@ -190,21 +191,21 @@ fn judgements(
     units: &[&Unit<'_>],
     tests: &[&Unit<'_>],
     fit: &Fit,
-    covariance: &DMatrix<f64>,
+    groups: &[Vec<usize>],
     pool: &[Scored],
     count: usize,
 ) -> Vec<Judgement> {
     let mut all = Vec::new();
-    for group in groups(units, &fit.terms) {
-        let Some(support) = support(units, fit, &group, pool) else { continue };
+    for group in groups {
+        let Some(support) = support(units, fit, group, pool) else { continue };
         let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
         let gain = if tests.is_empty() {
             cross_fitted(&acting, &support.with, &support.without)
         } else {
             on_tests(tests, &fit.terms[group[0]], &support)
         };
-        let judged = judge(units, &support, (fit, covariance, &group), gain, count);
-        all.push(Judgement { group, support, judged, gain });
+        let judged = judge(units, &support, gain, count);
+        all.push(Judgement { group: group.clone(), support, judged, gain });
     }
     all
 }
@@ -227,17 +228,14 @@ fn ordered(judgements: &[Judgement]) -> Vec<&Judgement> {
 }
 
 /// Says what was significant and is no finding.
-fn nuisance(own: &Judgement) -> String {
-    let term = &own.judged.estimated[0].term;
+fn nuisance(term: &Term) -> String {
     let whose = match term.whose {
         Whose::Robot(robot) => format!("robot {robot}"),
         Whose::Everyone => "all robots".to_owned(),
     };
-    let values: Vec<String> = own
-        .parameters()
-        .into_iter()
-        .map(|(label, estimate)| format!("{label} = {:.3e} {}", estimate.value, estimate.unit))
-        .collect();
+    let each = term.parameters().iter().zip(&term.values);
+    let values: Vec<String> =
+        each.map(|(parameter, value)| format!("{} = {value:.3e} {}", parameter.label(), parameter.unit)).collect();
     format!(
         "{whose}: {} ({}) is there, but too small to matter or of no use on data left out; it is no finding",
         term.effect.name(),
@@ -245,13 +243,7 @@ fn nuisance(own: &Judgement) -> String {
     )
 }
 
-fn finding(
-    units: &[&Unit<'_>],
-    roller: &Roller<'_, '_>,
-    fit: &Fit,
-    judgements: &[Judgement],
-    own: &Judgement,
-) -> Finding {
+fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgement) -> Finding {
     let info = own.judged.estimated[0].term.effect.info();
     let robots: BTreeSet<u32> =
         own.support.units.iter().map(|&unit| units[unit].robot.0).collect();
@@ -261,7 +253,6 @@ fn finding(
     support_set.dedup();
     let verdict = own.judged.verdict.unwrap_or(Verdict::CannotTell);
     let manoeuvre = (verdict == Verdict::CannotTell).then(|| info.broken_by.to_owned());
-    let kept = kept(fit, judgements);
     Finding {
         verdict,
         configuration: corrected::sections(&robots, &own.judged.estimated),
@@ -278,7 +269,7 @@ fn finding(
         held_out: HeldOut {
             log_score_gain: own.gain.total,
             log_score_gain_se: own.gain.standard_error,
-            rollout_rmse: rolled::of_finding(roller, own, &kept),
+            rollout_rmse: rolled::of_finding(rolled, units, own),
         },
         manoeuvre,
         summary: info.summary.to_owned(),

@@ -46,6 +46,8 @@ pub(crate) struct Selected {
     pub(crate) fit: Fit,
     /// How many starts were tried: what a probability is multiplied by.
     pub(crate) tests: usize,
+    /// What could be added, linearized beside the terms that were found.
+    pub(crate) pool: Pool,
 }
 
 /// Adds effects from `entries` as long as one is significant; prunes.
@@ -73,7 +75,7 @@ pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry]) -> Option<Selected>
     }
     let current = fit(units, current.terms, &|_| true, Effort::FULL)?;
     let fit = prune(units, current)?;
-    Some(Selected { fit, tests })
+    Some(Selected { fit, tests, pool })
 }
 
 /// Linearized candidates. What is linear enough is kept when terms are added: it serves to choose whom to fit.

@@ -2,13 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
 use pleiad_physics::Effect;
 
 use crate::diagnosis::candidate::Candidate;
 use crate::diagnosis::fit::{Effort, Fit, fit};
+use crate::diagnosis::naming::Estimated;
 use crate::diagnosis::parallel;
 use crate::diagnosis::refine::refine;
-use crate::diagnosis::select::{Scored, fit_beside, overlap, score, whites};
+use crate::diagnosis::select::{Scored, covariance, fit_beside, overlap, score, whites};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::step;
@@ -26,8 +28,12 @@ pub(crate) struct Support {
     pub(crate) units: Vec<usize>,
     /// Everything but the terms, fitted again.
     pub(crate) without: Fit,
-    /// With the terms.
+    /// With the terms, at the end.
     pub(crate) with: Fit,
+    /// The positions of the terms in `with`.
+    pub(crate) group: Vec<usize>,
+    /// The robust covariance of the parameters of `with`.
+    pub(crate) covariance: DMatrix<f64>,
     /// Effects that explain it about equally, the term's own first.
     pub(crate) members: Vec<Effect>,
     /// Variance of scores over that of independent errors, at least 1.
@@ -35,6 +41,7 @@ pub(crate) struct Support {
 }
 
 /// Looks for rivals of terms of one robot, or of everyone, among candidates that were scored beside the fit.
+/// `None` if the terms are too small to be a finding, or their parameters cannot be told apart.
 pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &[Scored]) -> Option<Support> {
     let chosen = &full.terms[*group.first()?];
     let own: Vec<usize> = (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
@@ -49,11 +56,23 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &[
     // What other robots share with this one stays where it is.
     let movable: Vec<bool> = others.iter().map(|other| other.whose == chosen.whose).collect();
     let count = others.len();
-    let without = fit(&acting, others, &|index| movable[index], Effort::RIVAL)?;
-    let mut with = without.clone();
-    for &term in group {
-        with = fit_beside(&acting, &with, full.terms[term].clone())?;
+    let with = {
+        let mut terms = others.clone();
+        terms.extend(group.iter().map(|&term| full.terms[term].clone()));
+        let movable: Vec<bool> = terms.iter().map(|term| term.whose == chosen.whose).collect();
+        fit(&acting, terms, &|index| movable[index], Effort::RIVAL)?
+    };
+    let positions: Vec<usize> = (count..with.terms.len()).collect();
+    let covariance = covariance(&acting, &with)?;
+    let relevant = positions.iter().any(|&position| {
+        let estimated = Estimated::of(&with, &covariance, position);
+        acting.iter().any(|unit| estimated.may_be_relevant(unit))
+    });
+    // What is too small to matter needs no rivals.
+    if !relevant {
+        return None;
     }
+    let without = fit(&acting, others, &|index| movable[index], Effort::RIVAL)?;
 
     let whites = whites(&acting, &without);
     let mine: Vec<usize> = (0..with.slots.len()).filter(|&slot| with.slots[slot].0 >= count).collect();
@@ -98,7 +117,7 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &[
     });
     let mut members: Vec<Effect> = group.iter().map(|&term| full.terms[term].effect).collect();
     members.extend(fitted.into_iter().flatten());
-    Some(Support { units: own, without, with, members, inflation })
+    Some(Support { units: own, without, with, group: positions, covariance, members, inflation })
 }
 
 /// The candidates that act on the same robots, with the units numbered as those that act.
