@@ -5,7 +5,7 @@
 
 use pleiad_physics::{Fit as How, Parameter};
 
-use crate::diagnosis::fit::{Fit, Normal, Slot, State, columns, fit, residuals};
+use crate::diagnosis::fit::{Effort, Fit, Normal, Slot, State, columns, fit, residuals};
 use crate::diagnosis::noise;
 use crate::diagnosis::starts::{Placing, thresholds};
 use crate::diagnosis::term::Term;
@@ -143,7 +143,7 @@ pub(crate) fn polish(units: &[&Unit<'_>], mut current: Fit) -> Fit {
             current.terms[slot.0].values[slot.1] = value;
             let mut terms = current.terms.clone();
             terms[slot.0].values[slot.1] = value;
-            match fit(units, terms, &|_| true, None) {
+            match fit(units, terms, &|_| true, Effort::FULL) {
                 Some(next) => current = next,
                 None => return current,
             }
