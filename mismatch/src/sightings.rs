@@ -3,7 +3,7 @@
 use pleiad_estimation::RobotId;
 use pleiad_estimation::sample::{Reading, Relative, Target};
 use pleiad_physics::chain::sensors::{self, Seen};
-use pleiad_physics::predict;
+use pleiad_physics::predict::{self, Instant, Path};
 use pleiad_physics::{Context, RobotModel, Scalar, signal};
 
 use crate::channel::Channel;
@@ -11,6 +11,7 @@ use crate::evidence::Evidence;
 use crate::plan::Plan;
 use crate::residual::{ChannelResiduals, Omission, Residual};
 use crate::sensors::At;
+use crate::track::Track;
 
 /// A range or a bearing.
 pub(crate) struct Sighted {
@@ -99,14 +100,20 @@ pub(crate) enum Part {
 }
 
 pub(crate) fn residuals<S: Scalar>(
-    channel: Channel,
-    part: Part,
-    plan: &Plan<Sighted>,
+    evidence: &Evidence<'_>,
+    (channel, part): (Channel, Part),
+    (track, plan): (&Track, &Plan<Sighted>),
     model: &RobotModel<S>,
 ) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(channel, plan);
     for own in &plan.items {
-        let instant = &own.at.instant;
+        let other = match own.target {
+            Target::Robot(other) => evidence.tracks.get(&other),
+            Target::Landmark(_) => None,
+        };
+        let path = other.and_then(|other| other.path_in_map(own.at.time_s));
+        let target = path.as_ref().map(|path| path as &dyn Path);
+        let instant = &Instant { target, ..own.at.instant(track) };
         let predicted = predict::sighting(model, instant, &own.seen);
         let context = Context {
             surroundings: instant.surroundings,
