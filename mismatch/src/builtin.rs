@@ -36,7 +36,7 @@ fn is_commanded(robot: &RobotRecording) -> bool {
 
 /// From commands to the body the wheels' geometry cancels, so radius and track are of unit length.
 fn unicycle() -> RobotModel<f64> {
-    let mut nominal = Nominal::ideal(1.0, 1.0);
+    let mut nominal = Nominal::ideal(0.033, 0.258);
     nominal.range_sigma_m = RANGE_SIGMA_M;
     nominal.bearing_sigma_rad = BEARING_SIGMA_RAD;
     RobotModel::nominal(Drive::Differential, nominal)
