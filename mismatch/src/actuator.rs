@@ -24,10 +24,10 @@ const CHANGE_REACH_S: f64 = 0.05;
 pub(crate) struct Turning {
     /// From where the window before ended to where this begins: nothing is compared, the servo goes on.
     before: Option<CommandWindow>,
-    window: CommandWindow,
+    pub(crate) window: CommandWindow,
     regime: Regime,
     /// By how much the wheels turned, left and right, radians; `None` where the prediction is not known.
-    measured: Option<[f64; 2]>,
+    pub(crate) measured: Option<[f64; 2]>,
     du_squared: [f64; 2],
 }
 

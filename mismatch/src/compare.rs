@@ -45,10 +45,10 @@ pub fn residuals_of<S: Scalar>(
         Channel::Gyro => gyro::residuals(&plans.gyro, model),
         Channel::Gps => sensors::gps(&plans.gps, model),
         Channel::Heading => sensors::heading(&plans.heading, model),
-        Channel::RangeToLandmark => sightings::residuals(channel, Part::Range, to_landmark, model),
-        Channel::BearingToLandmark => sightings::residuals(channel, Part::Bearing, of_landmark, model),
-        Channel::RangeToRobot => sightings::residuals(channel, Part::Range, to_robot, model),
-        Channel::BearingToRobot => sightings::residuals(channel, Part::Bearing, of_robot, model),
+        Channel::RangeToLandmark => sightings::residuals(channel, Part::Range, to_landmark, model, evidence),
+        Channel::BearingToLandmark => sightings::residuals(channel, Part::Bearing, of_landmark, model, evidence),
+        Channel::RangeToRobot => sightings::residuals(channel, Part::Range, to_robot, model, evidence),
+        Channel::BearingToRobot => sightings::residuals(channel, Part::Bearing, of_robot, model, evidence),
     }
 }
 

@@ -1,10 +1,10 @@
 //! Ranges and bearings against their prediction from the true poses.
 
-use pleiad_estimation::RobotId;
+use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_estimation::sample::{Reading, Relative, Target};
-use pleiad_physics::chain::sensors::{self, Seen};
-use pleiad_physics::predict;
-use pleiad_physics::{Context, RobotModel, Scalar, signal};
+use pleiad_physics::chain::sensors::{self as chain, Seen};
+use pleiad_physics::predict::{self, Instant};
+use pleiad_physics::{Context, Effect, RobotModel, Scalar, signal};
 
 use crate::channel::Channel;
 use crate::evidence::Evidence;
@@ -14,16 +14,16 @@ use crate::sensors::At;
 
 /// A range or a bearing.
 pub(crate) struct Sighted {
-    at: At,
-    target: Target,
-    seen: Seen,
+    pub(crate) at: At,
+    pub(crate) target: Target,
+    pub(crate) seen: Seen,
     /// Metres or radians.
-    measured: f64,
+    pub(crate) measured: f64,
 }
 
 /// What a prediction lacks.
 #[derive(Clone, Copy)]
-enum Missing {
+pub(crate) enum Missing {
     Truth(RobotId),
     Landmark,
 }
@@ -72,7 +72,7 @@ pub(crate) fn plans(evidence: &Evidence<'_>, robot: RobotId) -> [Plan<Sighted>; 
 }
 
 /// Where the target was, and how it moved.
-fn seen(evidence: &Evidence<'_>, target: Target, time_s: f64) -> Result<Seen, Missing> {
+pub(crate) fn seen(evidence: &Evidence<'_>, target: Target, time_s: f64) -> Result<Seen, Missing> {
     match target {
         Target::Landmark(landmark) => {
             let place = evidence.recording.landmarks.get(&landmark).ok_or(Missing::Landmark)?;
@@ -103,16 +103,20 @@ pub(crate) fn residuals<S: Scalar>(
     part: Part,
     plan: &Plan<Sighted>,
     model: &RobotModel<S>,
+    evidence: &Evidence<'_>,
 ) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(channel, plan);
+    let renamed = renames(model);
     for own in &plan.items {
         let instant = &own.at.instant;
-        let predicted = predict::sighting(model, instant, &own.seen);
+        let other = renamed.then(|| actual(model, instant, own.target)).filter(|other| *other != own.target);
+        let other = other.and_then(|other| seen(evidence, other, instant.time_s).ok());
+        let predicted = predict::sighting(model, instant, other.as_ref().unwrap_or(&own.seen));
         let context = Context {
             surroundings: instant.surroundings,
             ..Context::new(&model.nominal, instant.time_s, instant.motion.lift())
         };
-        let noise = sensors::noise(model, &context, predicted.range_m, predicted.bearing_rad);
+        let noise = chain::noise(model, &context, predicted.range_m, predicted.bearing_rad);
         let (value, sigma) = match part {
             Part::Range => (-predicted.range_m + own.measured, noise.range_sigma_m),
             Part::Bearing => ((-predicted.bearing_rad + own.measured).wrapped(), noise.bearing_sigma_rad),
@@ -120,6 +124,24 @@ pub(crate) fn residuals<S: Scalar>(
         channel.push(Residual::new(instant.time_s, own.at.regime, Some(own.target), &[value], &[sigma]));
     }
     channel
+}
+
+/// Whether a model gives wrong names to what is seen, always and not by chance.
+pub(crate) fn renames<S: Scalar>(model: &RobotModel<S>) -> bool {
+    model.effects.iter().any(|active| active.effect() == Effect::LandmarkIdentitySwap)
+}
+
+/// What a sighting of this name is of: the swap of two names undoes itself.
+pub(crate) fn actual<S: Scalar>(model: &RobotModel<S>, instant: &Instant, named: Target) -> Target {
+    let context = Context::new(&model.nominal, instant.time_s, instant.motion.lift());
+    let target = match named {
+        Target::Landmark(landmark) => signal::Target::Landmark(landmark.0),
+        Target::Robot(robot) => signal::Target::Robot(robot.0),
+    };
+    match chain::identity(model, &context, target, &[]) {
+        signal::Target::Landmark(landmark) => Target::Landmark(LandmarkId(landmark)),
+        signal::Target::Robot(robot) => Target::Robot(RobotId(robot)),
+    }
 }
 
 fn range_and_bearing(relative: &Relative) -> (Option<f64>, Option<f64>) {

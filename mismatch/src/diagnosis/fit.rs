@@ -6,6 +6,7 @@ use pleiad_physics::Variable;
 
 use crate::channel::Channel;
 use crate::diagnosis::noise::{self, Noise};
+use crate::diagnosis::starts::Placing;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Column, Unit};
@@ -53,6 +54,15 @@ pub(crate) struct Fit {
     pub(crate) columns: Vec<Vec<Column>>,
     /// Log-likelihood with the noise profiled out.
     pub(crate) log_likelihood: f64,
+}
+
+impl Fit {
+    /// How many parameters of the last term were fitted, or searched because they are onset, place or threshold.
+    pub(crate) fn parameters_of_last(&self) -> usize {
+        let Some(last) = self.terms.len().checked_sub(1) else { return 0 };
+        let fitted = self.slots.iter().filter(|(term, _)| *term == last).count();
+        (fitted + Placing::of(self.terms[last].effect.info()).count()).max(1)
+    }
 }
 
 /// Residuals of every unit under terms; `None` if a prediction is no finite number.

@@ -21,9 +21,9 @@ use crate::findings::{Estimate, Place, Verdict};
 /// Half the width of a 95 % interval, in standard errors.
 pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
 /// The near end of this many standard errors must be beyond the threshold of relevance.
-const NEAR_END: f64 = 3.0;
+pub(crate) const NEAR_END: f64 = 3.0;
 /// The cross-fitted gain must exceed this many standard errors.
-const GAIN_ERRORS: f64 = 2.0;
+pub(crate) const GAIN_ERRORS: f64 = 2.0;
 /// An effect without a threshold of relevance must change this share of a channel by more than a sigma.
 const LEAST_SHARE_CHANGED: f64 = 0.005;
 /// A place or regime is named if this share of the gain arises there.

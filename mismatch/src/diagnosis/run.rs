@@ -16,8 +16,9 @@ use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, is_unseen, j
 use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
-use crate::diagnosis::select::{Scored, Selected, select};
+use crate::diagnosis::select::{Pool, Selected, select};
 use crate::diagnosis::series;
+use crate::diagnosis::spread::{self, SpreadTerm};
 use crate::diagnosis::support::{Support, support};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
@@ -67,7 +68,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         all.iter().filter(|unit| !prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
-    let entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let mut entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let spread_entries = spread::take(&mut entries.entries);
 
     let mut notes = notes(&prepared, &all);
     let selected = select(&units, &entries.entries);
@@ -77,9 +79,12 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let Some(fit) = paired(&units, fit) else {
         return Ok(nothing(&prepared, entries, notes, false));
     };
-    let pool = pool.scored(&units, &entries.entries, &fit);
+    let count = count + spread_entries.len();
+    let scored = pool.scored(&units, &entries.entries, &fit);
     let groups = groups(&units, &fit.terms);
-    let judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
+    let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
+    let spread = spread::spread(&units, &fit, &spread_entries, count);
+    spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
@@ -95,6 +100,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     }
     let named = |group: &&Vec<usize>| found.iter().any(|own| own.group == **group);
     notes.extend(groups.iter().filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
+    notes.extend(spread.nuisances());
     notes.extend(
         found
             .iter()
@@ -105,9 +111,13 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let roller = Roller { prepared: &prepared, units: &units, tests: &tests };
     let kept = kept(&fit, &judgements);
     let rolled = rolled::robots(&roller, &kept);
-    let findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
-    let undetected = undetected(&units, &pool, count);
-    let corrected_terms: Vec<&Judged> = found.iter().map(|own| &own.judged).collect();
+    let mut findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
+    findings.extend(spread.found().into_iter().map(SpreadTerm::finding));
+    let mut undetected = undetected(&units, &scored, count);
+    undetected.extend_from_slice(&spread.undetected);
+    entries.untestable.extend_from_slice(&spread.untestable);
+    let corrected_terms: Vec<&Judged> =
+        found.iter().map(|own| &own.judged).chain(spread.found().into_iter().map(|own| &own.judged)).collect();
     let names = |tested: bool| -> Vec<String> {
         prepared.iter().filter(|own| own.tested == tested).map(|own| own.recording.name.clone()).collect()
     };
@@ -168,7 +178,8 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
     for unit in units {
         let name = &prepared[unit.recording].recording.name;
         for stretch in &unit.stretches {
-            for omission in &stretch.omissions {
+            let few = stretch.rows / FEW;
+            for omission in stretch.omissions.iter().filter(|omission| omission.matters(few)) {
                 notes.push(format!("{name}, robot {}, {}: {omission}", unit.robot, stretch.channel));
             }
         }
@@ -184,6 +195,8 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
     notes
 }
 
+/// What one row in so many lacks is not worth a note.
+const FEW: usize = 20;
 /// Below this, seconds, there are too few blocks of time for a robust variance.
 pub(crate) const SHORT_S: f64 = 20.0;
 
@@ -192,7 +205,7 @@ fn judgements(
     tests: &[&Unit<'_>],
     fit: &Fit,
     groups: &[Vec<usize>],
-    pool: &[Scored],
+    pool: &Pool,
     count: usize,
 ) -> Vec<Judgement> {
     let mut all = Vec::new();
@@ -228,7 +241,7 @@ fn ordered(judgements: &[Judgement]) -> Vec<&Judgement> {
 }
 
 /// Says what was significant and is no finding.
-fn nuisance(term: &Term) -> String {
+pub(crate) fn nuisance(term: &Term) -> String {
     let whose = match term.whose {
         Whose::Robot(robot) => format!("robot {robot}"),
         Whose::Everyone => "all robots".to_owned(),
@@ -265,14 +278,15 @@ fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgem
         support_set,
         parameters: own.parameters(),
         place: own.judged.place.clone(),
-        p_familywise: own.judged.p_familywise,
+        p_familywise: own.judged.p_familywise.max(f64::MIN_POSITIVE),
         held_out: HeldOut {
             log_score_gain: own.gain.total,
             log_score_gain_se: own.gain.standard_error,
             rollout_rmse: rolled::of_finding(rolled, units, own),
         },
         manoeuvre,
-        summary: info.summary.to_owned(),
+        // Sentences are the reader's: who writes the findings fills this.
+        summary: String::new(),
         equation: Some(info.equation.to_owned()),
     }
 }

@@ -17,7 +17,7 @@ use crate::diagnosis::white::{Step, White, step};
 /// Probability that anything is found in a clean recording, over everything that is tried in it.
 pub(crate) const FAMILYWISE: f64 = 0.002;
 /// An effect enters only if it gains more than this, twice in log-likelihood.
-const LEAST_GAIN: f64 = 20.0;
+pub(crate) const LEAST_GAIN: f64 = 20.0;
 /// A term is dropped if it is this likely without the effect.
 const PRUNE: f64 = 1e-4;
 /// A rival that gains less than this share of the best one by linearization is not fitted.
@@ -113,6 +113,11 @@ impl Pool {
                 .collect::<Vec<_>>()
         });
         scores.into_iter().flatten().collect()
+    }
+
+    /// Every candidate, whether or not it adds anything to a fit.
+    pub(crate) fn candidates(&self) -> impl Iterator<Item = &Candidate> {
+        self.known.values().flatten()
     }
 
     /// Whether every candidate was linearized beside these terms.
@@ -220,7 +225,8 @@ fn additions(
     if let Some(gain) = best_shared
         && groups.values().all(|own| own[0].step.gain < gain)
     {
-        return choose(units, whites, current, &shared).into_iter().collect();
+        // What shows on one robot alone may be its own.
+        return choose(units, whites, current, &strong).into_iter().collect();
     }
     // A robot waits if what it shows may be its share of an effect of the world.
     let sharers = units.len().max(1) as f64;
@@ -245,9 +251,7 @@ fn choose(
     let fitted: Vec<Option<(f64, Fit)>> = parallel::map(rivals, |rival| {
         let rival = refine(units, whites, rival);
         let added = fit_beside(units, current, rival.term())?;
-        let term = added.terms.last()?;
-        let whose = term.whose;
-        term.is_inside().then(|| (criterion(units, &added, inflation, whose), added))
+        added.terms.last()?.is_inside().then(|| (criterion(units, current, &added, inflation), added))
     });
     // Of equals the first: the one whose linearization was the strongest.
     let mut best: Option<(f64, Fit)> = None;
@@ -313,15 +317,17 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
     fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL)
 }
 
-/// Bayes' information criterion on the effective sample size; more is better.
-fn criterion(units: &[&Unit<'_>], fit: &Fit, inflation: f64, whose: Whose) -> f64 {
-    let rows: usize = units
-        .iter()
-        .filter(|unit| overlap(whose, Whose::Robot(unit.robot)))
-        .map(|unit| unit.rows.len())
-        .sum();
+/// What a fit with one more term gains by Bayes' information criterion on the effective sample size; more is
+/// better. Rivals may act on other robots.
+fn criterion(units: &[&Unit<'_>], current: &Fit, added: &Fit, inflation: f64) -> f64 {
+    let Some(term) = added.terms.last() else { return f64::NEG_INFINITY };
+    let (mut rows, mut before) = (0, 0.0);
+    for (unit, state) in units.iter().zip(&current.states).filter(|(unit, _)| term.acts_on(unit.robot)) {
+        rows += unit.rows.len();
+        before += state.noise.log_likelihood;
+    }
     let effective = (rows as f64 / inflation).max(2.0);
-    2.0 * fit.log_likelihood / inflation - fit.slots.len() as f64 * effective.ln()
+    2.0 * (added.log_likelihood - before) / inflation - added.parameters_of_last() as f64 * effective.ln()
 }
 
 /// The robust covariance of all fitted parameters, in the order of the slots.

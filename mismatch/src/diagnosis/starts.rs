@@ -60,6 +60,11 @@ impl Placing {
         }
     }
 
+    /// How many parameters say it.
+    pub(crate) fn count(self) -> usize {
+        usize::from(self.onset.is_some()) + 4 * usize::from(self.region.is_some())
+    }
+
     pub(crate) fn is_some(self) -> bool {
         self.onset.is_some() || self.region.is_some()
     }

@@ -10,13 +10,13 @@ use crate::diagnosis::fit::{Effort, Fit, fit};
 use crate::diagnosis::naming::Estimated;
 use crate::diagnosis::parallel;
 use crate::diagnosis::refine::refine;
-use crate::diagnosis::select::{Scored, covariance, fit_beside, overlap, score, whites};
+use crate::diagnosis::select::{Pool, Scored, covariance, fit_beside, overlap, score, whites};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::step;
 
 /// A rival explains the data about equally if it loses less than this, twice in log-likelihood: odds of 20.
-const ODDS: f64 = 5.991_464_547_107_98;
+pub(crate) const ODDS: f64 = 5.991_464_547_107_98;
 /// So many rivals are fitted.
 const RIVALS: usize = 8;
 /// A rival that gains less than this share by linearization does not explain it.
@@ -40,9 +40,10 @@ pub(crate) struct Support {
     pub(crate) inflation: f64,
 }
 
-/// Looks for rivals of terms of one robot, or of everyone, among candidates that were scored beside the fit.
+/// Looks for rivals of terms of one robot, or of everyone, among candidates that were linearized beside the fit;
+/// one that the fit leaves nothing to explain may be exactly the same.
 /// `None` if the terms are too small to be a finding, or their parameters cannot be told apart.
-pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &[Scored]) -> Option<Support> {
+pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &Pool) -> Option<Support> {
     let chosen = &full.terms[*group.first()?];
     let own: Vec<usize> = (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
     let acting: Vec<&Unit<'_>> = own.iter().map(|&unit| units[unit]).collect();
@@ -86,7 +87,7 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &[
     let inflation = own_step.as_ref().map_or(1.0, |own| own.inflation.max(1.0));
     let own_gain = own_step.map_or(0.0, |own| own.gain);
 
-    let rescored = parallel::map(&rivals(pool, chosen, &own), |candidate| score(&acting, &whites, candidate));
+    let rescored = parallel::map(&rivals(units, full, chosen, pool), |candidate| score(&acting, &whites, candidate));
     let mut best: BTreeMap<Effect, Scored> = BTreeMap::new();
     for one in rescored.into_iter().flatten() {
         let effect = one.candidate.term.effect;
@@ -121,7 +122,16 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &[
 }
 
 /// The candidates that act on the same robots, with the units numbered as those that act.
-fn rivals(pool: &[Scored], chosen: &Term, own: &[usize]) -> Vec<Candidate> {
-    let same = pool.iter().filter(|rival| rival.candidate.term.whose == chosen.whose);
-    same.map(|rival| rival.candidate.renumbered(own)).collect()
+fn rivals(units: &[&Unit<'_>], full: &Fit, chosen: &Term, pool: &Pool) -> Vec<Candidate> {
+    let known = |rival: &Term| {
+        full.terms.iter().any(|term| term.effect == rival.effect && overlap(term.whose, rival.whose))
+    };
+    let same = |rival: &Term| {
+        units.iter().all(|unit| rival.acts_on(unit.robot) == chosen.acts_on(unit.robot)) && !known(rival)
+    };
+    let own: Vec<usize> = (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
+    pool.candidates()
+        .filter(|candidate| same(&candidate.term))
+        .map(|candidate| candidate.renumbered(&own))
+        .collect()
 }
