@@ -36,10 +36,11 @@ pub(crate) fn sections(robots: &[u32], found: &[Estimated]) -> String {
     for robot in robots {
         for estimated in found {
             let spec = EffectSpec::from(&effect(estimated));
-            if let Ok(text) = toml::to_string(&spec) {
-                let text = text.replace("\n[", &format!("\n[robots.r{robot}.effects."));
-                sections.push(format!("[[robots.r{robot}.effects]]\n{}", text.trim_end()));
-            }
+            let parameters = toml::Value::Table(spec.parameters);
+            sections.push(format!(
+                "[[robots.r{robot}.effects]]\nname = \"{}\"\nparameters = {parameters}",
+                spec.name
+            ));
         }
     }
     sections.join("\n\n")

@@ -54,7 +54,7 @@ pub(crate) fn entries(units: &[&Unit<'_>]) -> Entries {
 
 /// Whether an effect is the same for every robot: of the world, of a place in the map, of the map itself, or
 /// of the reference system's clock.
-fn is_shared(info: &EffectInfo) -> bool {
+pub(crate) fn is_shared(info: &EffectInfo) -> bool {
     let has = |name: &str| info.parameters.iter().any(|parameter| parameter.name == name);
     let own_event = has("t_on_s") || has("range_m");
     let reference_clock = info.channels == [Needed::Truth] && info.stage == Stage::Sensor && has("latency_s");

@@ -19,7 +19,7 @@ use crate::diagnosis::unit::{Row, Unit};
 use crate::findings::{Estimate, Place, Verdict};
 
 /// Half the width of a 95 % interval, in standard errors.
-const Z_95: f64 = 1.959_963_984_540_054;
+pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
 /// The near end of this many standard errors must be beyond the threshold of relevance.
 pub(crate) const NEAR_END: f64 = 3.0;
 /// The cross-fitted gain must exceed this many standard errors.
@@ -54,17 +54,18 @@ impl Estimated {
     /// Of two ways to write the same, the one with a positive amplitude: its phase is half a turn away.
     fn make_positive(&mut self) {
         let parameters = self.term.parameters();
-        let [amplitude, phase] = parameters else { return };
+        let [.., amplitude, phase] = parameters else { return };
         let turns = phase.unit == "rad" && phase.plausible.1 - phase.plausible.0 > PI;
         if !turns || phase.relevance.threshold(&pleiad_physics::Floors::default()) > 0.0 {
             return;
         }
-        if amplitude.plausible.0 < 0.0 && self.term.values[0] < 0.0 {
+        let [.., size, angle] = self.term.values.as_mut_slice() else { return };
+        if amplitude.plausible.0 < 0.0 && *size < 0.0 {
             let period = phase.plausible.1 - phase.plausible.0;
             let half_turn = if period > 2.0 * PI { PI } else { 0.5 * PI };
-            self.term.values[0] = -self.term.values[0];
-            let moved = self.term.values[1] + half_turn;
-            self.term.values[1] = if half_turn < PI { (2.0 * moved).wrapped() * 0.5 } else { moved.wrapped() };
+            *size = -*size;
+            let moved = *angle + half_turn;
+            *angle = if half_turn < PI { (2.0 * moved).wrapped() * 0.5 } else { moved.wrapped() };
         }
     }
 

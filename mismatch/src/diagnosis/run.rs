@@ -161,7 +161,7 @@ fn roles(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Vec<Opti
     Ok(roles)
 }
 
-fn unit<'a>(index: usize, own: &'a Prepared<'a>, robot: RobotId, model: &RobotModel<f64>) -> Unit<'a> {
+pub(crate) fn unit<'a>(index: usize, own: &'a Prepared<'a>, robot: RobotId, model: &RobotModel<f64>) -> Unit<'a> {
     let floors = own.recording.nominal.as_ref().map_or_else(Floors::default, |nominal| Floors {
         lateral_slip_s: nominal.noise.odometry_floor_lateral_slip_s,
         sensor_lag_s: nominal.noise.gyro_floor_lag_s,
@@ -178,7 +178,8 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
     for unit in units {
         let name = &prepared[unit.recording].recording.name;
         for stretch in &unit.stretches {
-            for omission in &stretch.omissions {
+            let few = stretch.rows / FEW;
+            for omission in stretch.omissions.iter().filter(|omission| omission.matters(few)) {
                 notes.push(format!("{name}, robot {}, {}: {omission}", unit.robot, stretch.channel));
             }
         }
@@ -194,6 +195,8 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
     notes
 }
 
+/// What one row in so many lacks is not worth a note.
+const FEW: usize = 20;
 /// Below this, seconds, there are too few blocks of time for a robust variance.
 pub(crate) const SHORT_S: f64 = 20.0;
 
@@ -275,14 +278,15 @@ fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgem
         support_set,
         parameters: own.parameters(),
         place: own.judged.place.clone(),
-        p_familywise: own.judged.p_familywise,
+        p_familywise: own.judged.p_familywise.max(f64::MIN_POSITIVE),
         held_out: HeldOut {
             log_score_gain: own.gain.total,
             log_score_gain_se: own.gain.standard_error,
             rollout_rmse: rolled::of_finding(rolled, units, own),
         },
         manoeuvre,
-        summary: info.summary.to_owned(),
+        // Sentences are the reader's: who writes the findings fills this.
+        summary: String::new(),
         equation: Some(info.equation.to_owned()),
     }
 }

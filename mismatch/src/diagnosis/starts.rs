@@ -224,7 +224,7 @@ fn integers(least: f64, greatest: f64) -> Vec<f64> {
 
 /// Evenly spaced logarithms over what is plausible and could act: a limit cannot act above all that the
 /// wheels are asked for, a threshold not above it either.
-fn thresholds(parameter: &Parameter, units: &[&Unit<'_>]) -> Vec<f64> {
+pub(crate) fn thresholds(parameter: &Parameter, units: &[&Unit<'_>]) -> Vec<f64> {
     let demand = units
         .iter()
         .map(|unit| match parameter.unit {

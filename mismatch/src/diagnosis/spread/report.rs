@@ -56,7 +56,7 @@ impl SpreadTerm {
                 rollout_rmse: Vec::new(),
             },
             manoeuvre: (self.support.len() > 1).then(|| info.broken_by.to_owned()),
-            summary: info.summary.to_owned(),
+            summary: String::new(),
             equation: Some(info.equation.to_owned()),
         }
     }
