@@ -18,8 +18,8 @@ use pleiad_sim_peers::{Scenario, simulate};
 /// Long enough for about half of the manoeuvres.
 const DURATION_S: f64 = 120.0;
 const SEED: u64 = 5;
-/// How many half widths of its 95 % interval an estimate may be off: more is 3 in 1000 by chance.
-const HALF_WIDTHS: f64 = 1.5;
+/// How many half widths of its 95 % interval an estimate may be off: more is 1 in 10 000 by chance.
+const HALF_WIDTHS: f64 = 2.0;
 /// What is searched on a grid and has no interval may be off by so much: an onset, seconds; a place, metres.
 const ONSET_S: f64 = 0.5;
 const PLACE_M: f64 = 0.1;

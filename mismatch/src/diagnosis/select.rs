@@ -332,6 +332,9 @@ fn criterion(units: &[&Unit<'_>], current: &Fit, added: &Fit, inflation: f64) ->
 
 /// The robust covariance of all fitted parameters, in the order of the slots.
 pub(crate) fn covariance(units: &[&Unit<'_>], fit: &Fit) -> Option<DMatrix<f64>> {
+    if fit.slots.is_empty() {
+        return Some(DMatrix::zeros(0, 0));
+    }
     let bare: Vec<White<'_, '_>> =
         units.iter().zip(&fit.states).map(|(unit, state)| White::new(unit, state, &[])).collect();
     let bare: Vec<&White<'_, '_>> = bare.iter().collect();
