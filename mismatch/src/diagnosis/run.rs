@@ -58,30 +58,31 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         let evidence = Evidence::new(recording, &models);
         prepared.push(Prepared { recording, evidence, models, tested });
     }
-    let all: Vec<Unit<'_>> = prepared
+    let mut all: Vec<Unit<'_>> = prepared
         .iter()
         .enumerate()
         .flat_map(|(index, own)| own.models.iter().map(move |(&robot, model)| (index, own, robot, model)))
         .map(|(index, own, robot, model)| unit(index, own, robot, model))
         .collect();
+    let swaps = spread::swaps(&mut all);
     let units: Vec<&Unit<'_>> =
         all.iter().filter(|unit| !prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let mut entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
-    let spread_entries = spread::take(&mut entries.entries);
+    let spread_entries = spread::take(&mut entries, &units);
 
     let mut notes = notes(&prepared, &all);
     let selected = select(&units, &entries.entries);
     let (fit, count) = match selected {
-        Some(selected) => (selected.fit, selected.tests + spread_entries.len()),
+        Some(selected) => (selected.fit, selected.tests + spread_entries.len() + swaps.tests),
         None => return Ok(nothing(&prepared, entries, notes, units.is_empty())),
     };
     let covariance =
         covariance(&units, &fit).unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
     let pool = Pool::default().scored(&units, &entries.entries, &fit);
     let mut judgements = judgements(&units, &tests, &fit, &covariance, &pool, count);
-    let spread = spread::spread(&units, &fit, &spread_entries, count);
+    let spread = spread::spread(&units, &fit, &spread_entries, &swaps, count);
     spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
@@ -96,7 +97,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
             ));
         }
     }
-    notes.extend(judgements.iter().filter(|own| own.judged.verdict.is_none()).map(|own| nuisance(&own.judged)));
+    let unexplained = judgements.iter().filter(|own| !spread.explains(own.position));
+    notes.extend(unexplained.filter(|own| own.judged.verdict.is_none()).map(|own| nuisance(&own.judged)));
     notes.extend(spread.nuisances());
     notes.extend(
         found
