@@ -58,18 +58,19 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         let evidence = Evidence::new(recording, &models);
         prepared.push(Prepared { recording, evidence, models, tested });
     }
-    let all: Vec<Unit<'_>> = prepared
+    let mut all: Vec<Unit<'_>> = prepared
         .iter()
         .enumerate()
         .flat_map(|(index, own)| own.models.iter().map(move |(&robot, model)| (index, own, robot, model)))
         .map(|(index, own, robot, model)| unit(index, own, robot, model))
         .collect();
+    let swaps = spread::swaps(&mut all);
     let units: Vec<&Unit<'_>> =
         all.iter().filter(|unit| !prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let mut entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
-    let spread_entries = spread::take(&mut entries.entries);
+    let spread_entries = spread::take(&mut entries, &units);
 
     let mut notes = notes(&prepared, &all);
     let selected = select(&units, &entries.entries);
@@ -79,11 +80,11 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let Some(fit) = paired(&units, fit) else {
         return Ok(nothing(&prepared, entries, notes, false));
     };
-    let count = count + spread_entries.len();
+    let count = count + spread_entries.len() + swaps.tests;
     let scored = pool.scored(&units, &entries.entries, &fit);
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
-    let spread = spread::spread(&units, &fit, &spread_entries, count);
+    let spread = spread::spread(&units, &fit, &spread_entries, &swaps, count);
     spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
@@ -99,7 +100,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         }
     }
     let named = |group: &&Vec<usize>| found.iter().any(|own| own.group == **group);
-    notes.extend(groups.iter().filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
+    let unexplained = groups.iter().filter(|group| !spread.explains(group[0]));
+    notes.extend(unexplained.filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
     notes.extend(spread.nuisances());
     notes.extend(
         found
