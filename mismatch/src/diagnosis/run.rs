@@ -315,12 +315,14 @@ fn kept(fit: &Fit, judgements: &[Judgement]) -> Vec<Term> {
 /// Where lag or delay was found without encoders, both are fitted: only their sum is well known.
 fn paired(units: &[&Unit<'_>], fit: Fit) -> Option<Fit> {
     let mut terms = fit.terms.clone();
-    for term in &fit.terms {
+    for (position, term) in fit.terms.iter().enumerate() {
         let Some(twin) = twin(term.effect) else { continue };
         let known = fit.terms.iter().any(|other| other.effect == twin && other.whose == term.whose);
         if !known && is_unseen(units, term) {
-            let off = twin.info().parameters.iter().map(|parameter| parameter.off).collect();
-            terms.push(Term::new(twin, term.whose, off));
+            // A lag of zero moves predictions as a delay does, and no step leaves it. So each begins with half.
+            let half: Vec<f64> = term.values.iter().map(|value| 0.5 * value).collect();
+            terms[position].values.clone_from(&half);
+            terms.push(Term::new(twin, term.whose, half));
         }
     }
     if terms.len() == fit.terms.len() {
