@@ -156,7 +156,8 @@ fn of_family(family: &Family<'_, '_>, fit: &Fit, robot: RobotId, tests: usize) -
     let base = family.base();
     let shows = family.select(&base, tests);
     let found: Vec<Effect> = shows.iter().map(|own| family.members[own.member].effect).collect();
-    let mut own = Spread { undetected: judge::undetected(family, &base, &found, robot, tests), ..Spread::default() };
+    let mut own =
+        Spread { undetected: judge::undetected(family, &base, &found, robot, tests), ..Spread::default() };
     for shows in &shows {
         let effect = family.members[shows.member].effect;
         // Effects of the mean that a family knows as rivals are the mean's to name.
