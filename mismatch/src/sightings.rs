@@ -3,7 +3,7 @@
 use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_estimation::sample::{Reading, Relative, Target};
 use pleiad_physics::chain::sensors::{self as chain, Seen};
-use pleiad_physics::predict::{self, Instant};
+use pleiad_physics::predict::{self, Instant, Path};
 use pleiad_physics::{Context, Effect, RobotModel, Scalar, signal};
 
 use crate::channel::Channel;
@@ -11,6 +11,7 @@ use crate::evidence::Evidence;
 use crate::plan::Plan;
 use crate::residual::{ChannelResiduals, Omission, Residual};
 use crate::sensors::At;
+use crate::track::Track;
 
 /// A range or a bearing.
 pub(crate) struct Sighted {
@@ -99,19 +100,26 @@ pub(crate) enum Part {
 }
 
 pub(crate) fn residuals<S: Scalar>(
-    channel: Channel,
-    part: Part,
-    plan: &Plan<Sighted>,
-    model: &RobotModel<S>,
     evidence: &Evidence<'_>,
+    (channel, part): (Channel, Part),
+    (track, plan): (&Track, &Plan<Sighted>),
+    model: &RobotModel<S>,
 ) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(channel, plan);
     let renamed = renames(model);
     for own in &plan.items {
-        let instant = &own.at.instant;
-        let other = renamed.then(|| actual(model, instant, own.target)).filter(|other| *other != own.target);
-        let other = other.and_then(|other| seen(evidence, other, instant.time_s).ok());
-        let predicted = predict::sighting(model, instant, other.as_ref().unwrap_or(&own.seen));
+        let path_of = |target: Target| match target {
+            Target::Robot(other) => evidence.tracks.get(&other)?.path_in_map(own.at.time_s),
+            Target::Landmark(_) => None,
+        };
+        let plain = own.at.instant(track);
+        let other = renamed.then(|| actual(model, &plain, own.target)).filter(|other| *other != own.target);
+        let other = other.and_then(|other| Some((other, seen(evidence, other, plain.time_s).ok()?)));
+        let (target, seen) = other.as_ref().map_or((own.target, &own.seen), |(target, seen)| (*target, seen));
+        let path = path_of(target);
+        let target = path.as_ref().map(|path| path as &dyn Path);
+        let instant = &Instant { target, ..plain };
+        let predicted = predict::sighting(model, instant, seen);
         let context = Context {
             surroundings: instant.surroundings,
             ..Context::new(&model.nominal, instant.time_s, instant.motion.lift())

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::process::ExitCode;
 
 use pleiad_physics::Effect;
-use pleiad_tests::known_effects::{Case, SEEDS, case, cases, run, table};
+use pleiad_tests::known_effects::{Case, SEEDS, case, cases, rows, run, table};
 
 /// What the table stands between.
 const MARKS: [&str; 2] = ["<!-- table -->", "<!-- end -->"];
@@ -53,7 +53,13 @@ fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
     if chosen.is_empty() {
         chosen = cases();
     }
-    let text = table(&run(&chosen, &seeds, |_| {}));
+    let begun = std::time::Instant::now();
+    let mut progress = std::io::stderr();
+    let outcomes = run(&chosen, &seeds, |outcome| {
+        let passed_s = begun.elapsed().as_secs_f64();
+        let _ = write!(progress, "{passed_s:.0} s\n{}", rows(outcome));
+    });
+    let text = table(&outcomes);
     match out {
         Some(file) => replace(&file, &text),
         None => write!(std::io::stdout(), "{text}").map_err(|error| error.to_string()),

@@ -131,8 +131,10 @@ fn found(units: &[&Unit<'_>], current: &Fit, effect: Effect, whose: Whose) -> Op
 
 /// Values and intervals of every term.
 fn known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
-    let covariance = covariance(units, fit)
-        .unwrap_or_else(|| nalgebra::DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
+    // Thresholds alone leave nothing that has a derivative.
+    let found = if fit.slots.is_empty() { None } else { covariance(units, fit) };
+    let covariance =
+        found.unwrap_or_else(|| nalgebra::DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
     let profile = Profile::new(units, fit);
     let one = |position: usize| {
         let estimated = Estimated::of(fit, &covariance, position);

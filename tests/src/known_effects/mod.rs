@@ -15,19 +15,26 @@ use pleiad_sim_peers::simulate;
 
 pub use cases::{Apart, Case, ROBOT, apart, case, cases};
 pub use outcome::{Outcome, Row};
-pub use table::table;
+pub use table::{rows, table};
 
 /// Seeds of the recordings of every effect.
 pub const SEEDS: std::ops::RangeInclusive<u64> = 1..=20;
 
 /// Simulates every case from every seed and fits it, on all processors; the result does not depend on how
-/// many there are.
-pub fn run(cases: &[Case], seeds: &[u64], mut told: impl FnMut(&Case)) -> Vec<Outcome> {
-    let jobs: Vec<(usize, u64)> =
-        (0..cases.len()).flat_map(|case| seeds.iter().map(move |&seed| (case, seed))).collect();
+/// many there are. `told` gets each outcome as it comes.
+pub fn run(cases: &[Case], seeds: &[u64], mut told: impl FnMut(&Outcome)) -> Vec<Outcome> {
+    let one = |case: &Case| {
+        let outcome = Outcome::new(case, fits(case, seeds));
+        told(&outcome);
+        outcome
+    };
+    cases.iter().map(one).collect()
+}
+
+/// The fits of a case in the order of the seeds; `None` where the effect is not found.
+fn fits(case: &Case, seeds: &[u64]) -> Vec<Option<KnownFit>> {
     let next = AtomicUsize::new(0);
-    let fitted = |&(case, seed): &(usize, u64)| -> Option<KnownFit> {
-        let case: &Case = &cases[case];
+    let fitted = |seed: u64| -> Option<KnownFit> {
         let run = simulate(&case.scenario, seed).expect("a scenario that is valid");
         let fits = fit_known(&run.recording, ROBOT, &[case.effect]).expect("a recording with its nominal");
         fits.into_iter().next()
@@ -36,8 +43,8 @@ pub fn run(cases: &[Case], seeds: &[u64], mut told: impl FnMut(&Case)) -> Vec<Ou
         let mut done = Vec::new();
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(job) = jobs.get(index) else { return done };
-            done.push((index, fitted(job)));
+            let Some(&seed) = seeds.get(index) else { return done };
+            done.push((index, fitted(seed)));
         }
     };
     let mut all: Vec<(usize, Option<KnownFit>)> = thread::scope(|scope| {
@@ -46,12 +53,5 @@ pub fn run(cases: &[Case], seeds: &[u64], mut told: impl FnMut(&Case)) -> Vec<Ou
         handles.into_iter().flat_map(|handle| handle.join().expect("no worker panics")).collect()
     });
     all.sort_by_key(|(index, _)| *index);
-    let mut fits = all.into_iter().map(|(_, fit)| fit);
-    cases
-        .iter()
-        .map(|case| {
-            told(case);
-            Outcome::new(case, fits.by_ref().take(seeds.len()).collect())
-        })
-        .collect()
+    all.into_iter().map(|(_, fit)| fit).collect()
 }

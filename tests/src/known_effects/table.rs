@@ -13,17 +13,7 @@ pub fn table(outcomes: &[Outcome]) -> String {
          |---|---|---|---|---|---|---|---|---|---|\n",
     );
     for outcome in outcomes {
-        let info = outcome.effect.info();
-        for (index, row) in outcome.rows.iter().enumerate() {
-            let (number, name) = if index == 0 {
-                (info.number.to_string(), format!("`{}`", info.name))
-            } else {
-                <_>::default()
-            };
-            let found = format!("{}/{}", outcome.found, outcome.seeds);
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "| {number} | {name} | {} | {found} |", cells(row));
-        }
+        text += &rows(outcome);
     }
     let covered: usize = outcomes.iter().flat_map(|outcome| &outcome.rows).map(|row| row.covered).sum();
     let all: usize = outcomes.iter().flat_map(|outcome| &outcome.rows).map(|row| row.errors.len()).sum();
@@ -34,6 +24,20 @@ pub fn table(outcomes: &[Outcome]) -> String {
         "\nOf {all} intervals of 95 %, {covered} hold the injected value ({share:.1} %); mean z^2 of all \
          {squares:.2}."
     );
+    text
+}
+
+/// The rows of one effect.
+pub fn rows(outcome: &Outcome) -> String {
+    let mut text = String::new();
+    let info = outcome.effect.info();
+    for (index, row) in outcome.rows.iter().enumerate() {
+        let (number, name) =
+            if index == 0 { (info.number.to_string(), format!("`{}`", info.name)) } else { <_>::default() };
+        let found = format!("{}/{}", outcome.found, outcome.seeds);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "| {number} | {name} | {} | {found} |", cells(row));
+    }
     text
 }
 

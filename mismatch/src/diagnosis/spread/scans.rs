@@ -26,7 +26,7 @@ pub(super) struct Reading<'s> {
 impl Reading<'_> {
     /// Range and bearing minus those predicted for a target, and the range predicted.
     pub(super) fn errors(&self, model: &RobotModel<f64>, seen: &Seen) -> ([Option<f64>; 2], f64) {
-        let predicted = predict::sighting(model, &self.sighted.at.instant, seen);
+        let predicted = predict::sighting(model, &self.sighted.at.bare(), seen);
         let range = self.measured[0].map(|range_m| range_m - predicted.range_m);
         let bearing = self.measured[1].map(|bearing_rad| (bearing_rad - predicted.bearing_rad).wrapped());
         ([range, bearing], predicted.range_m)
@@ -45,7 +45,7 @@ pub(super) fn scans<'s>(unit: &'s Unit<'_>, kind: usize) -> Vec<Scan<'s>> {
     let [ranges, bearings] = [0, 1].map(|part| plans.sightings[2 * kind + part].items.as_slice());
     let mut found: Vec<Scan<'s>> = Vec::new();
     let mut push = |sighted: &'s Sighted, measured| {
-        let time_s = sighted.at.instant.time_s;
+        let time_s = sighted.at.time_s;
         let reading = Reading { sighted, measured };
         match found.last_mut() {
             Some(scan) if scan.time_s >= time_s => scan.readings.push(reading),
@@ -55,7 +55,7 @@ pub(super) fn scans<'s>(unit: &'s Unit<'_>, kind: usize) -> Vec<Scan<'s>> {
     // Both are in the order of the record; a sighting with both parts is in both.
     let mut rest = bearings;
     for range in ranges {
-        let earlier = rest.partition_point(|own| own.at.instant.time_s < range.at.instant.time_s);
+        let earlier = rest.partition_point(|own| own.at.time_s < range.at.time_s);
         for bearing in &rest[..earlier] {
             push(bearing, [None, Some(bearing.measured)]);
         }
@@ -76,7 +76,7 @@ pub(super) fn scans<'s>(unit: &'s Unit<'_>, kind: usize) -> Vec<Scan<'s>> {
 
 #[allow(clippy::float_cmp, reason = "the same stamp")]
 fn is_same(range: &Sighted, bearing: &Sighted) -> bool {
-    range.target == bearing.target && range.at.instant.time_s == bearing.at.instant.time_s
+    range.target == bearing.target && range.at.time_s == bearing.at.time_s
 }
 
 /// Everything of a kind whose place at an instant is known.
@@ -96,7 +96,7 @@ pub(super) fn targets(unit: &Unit<'_>, kind: usize, time_s: f64) -> Vec<(Target,
 pub(super) fn actual(model: &RobotModel<f64>, reading: &Reading<'_>) -> Target {
     let named = reading.sighted.target;
     if sightings::renames(model) {
-        sightings::actual(model, &reading.sighted.at.instant, named)
+        sightings::actual(model, &reading.sighted.at.bare(), named)
     } else {
         named
     }

@@ -231,7 +231,7 @@ fn collect(
                 rows.push(Row {
                     kind,
                     range_m,
-                    yaw_rate_rad_s: own.sighted.at.instant.motion.yaw_rate_rad_s,
+                    yaw_rate_rad_s: own.sighted.at.motion.yaw_rate_rad_s,
                     errors,
                     others: others.map(|(_, seen)| own.errors(model, seen).0).collect(),
                     choices: scan.readings.len() - 1,
