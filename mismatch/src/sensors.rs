@@ -27,7 +27,7 @@ pub(crate) struct Heading {
 #[derive(Clone)]
 pub(crate) struct At {
     pub(crate) time_s: f64,
-    motion: Motion<f64>,
+    pub(crate) motion: Motion<f64>,
     surroundings: Surroundings,
     pub(crate) regime: Regime,
     pub(crate) pose: Pose<f64>,
@@ -49,12 +49,17 @@ impl At {
         Some(Self { time_s, motion: motion(&regime, pose), surroundings, regime, pose, reference, on_path })
     }
 
+    /// The instant alone: velocities are taken for constant.
+    pub(crate) fn plain(&self) -> Instant<'static> {
+        let Self { time_s, motion, surroundings, .. } = *self;
+        Instant { time_s, motion, surroundings, anchor: None, target: None }
+    }
+
     /// The instant, with the robot's path to carry the reference pose along.
     pub(crate) fn instant<'a>(&self, track: &'a Track) -> Instant<'a> {
         let (time_s, pose) = self.reference;
         let anchor = self.on_path.map(|on_path| Anchor { time_s, pose, path: track.path(), on_path });
-        let Self { time_s, motion, surroundings, .. } = *self;
-        Instant { time_s, motion, surroundings, anchor, target: None }
+        Instant { anchor, ..self.plain() }
     }
 }
 

@@ -1,10 +1,10 @@
 //! Ranges and bearings against their prediction from the true poses.
 
-use pleiad_estimation::RobotId;
+use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_estimation::sample::{Reading, Relative, Target};
-use pleiad_physics::chain::sensors::{self, Seen};
+use pleiad_physics::chain::sensors::{self as chain, Seen};
 use pleiad_physics::predict::{self, Instant, Path};
-use pleiad_physics::{Context, RobotModel, Scalar, signal};
+use pleiad_physics::{Context, Effect, RobotModel, Scalar, signal};
 
 use crate::channel::Channel;
 use crate::evidence::Evidence;
@@ -15,16 +15,16 @@ use crate::track::Track;
 
 /// A range or a bearing.
 pub(crate) struct Sighted {
-    at: At,
-    target: Target,
-    seen: Seen,
+    pub(crate) at: At,
+    pub(crate) target: Target,
+    pub(crate) seen: Seen,
     /// Metres or radians.
-    measured: f64,
+    pub(crate) measured: f64,
 }
 
 /// What a prediction lacks.
 #[derive(Clone, Copy)]
-enum Missing {
+pub(crate) enum Missing {
     Truth(RobotId),
     Landmark,
 }
@@ -73,7 +73,7 @@ pub(crate) fn plans(evidence: &Evidence<'_>, robot: RobotId) -> [Plan<Sighted>; 
 }
 
 /// Where the target was, and how it moved.
-fn seen(evidence: &Evidence<'_>, target: Target, time_s: f64) -> Result<Seen, Missing> {
+pub(crate) fn seen(evidence: &Evidence<'_>, target: Target, time_s: f64) -> Result<Seen, Missing> {
     match target {
         Target::Landmark(landmark) => {
             let place = evidence.recording.landmarks.get(&landmark).ok_or(Missing::Landmark)?;
@@ -106,20 +106,24 @@ pub(crate) fn residuals<S: Scalar>(
     model: &RobotModel<S>,
 ) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(channel, plan);
+    let renamed = renames(model);
     for own in &plan.items {
-        let other = match own.target {
-            Target::Robot(other) => evidence.tracks.get(&other),
+        let at = &own.at;
+        let plain = at.instant(track);
+        let other = renamed.then(|| actual(model, &plain, own.target)).filter(|other| *other != own.target);
+        let target = other.unwrap_or(own.target);
+        let other = other.and_then(|other| seen(evidence, other, at.time_s).ok());
+        let path = match target {
+            Target::Robot(robot) => evidence.tracks.get(&robot).and_then(|track| track.path_in_map(at.time_s)),
             Target::Landmark(_) => None,
         };
-        let path = other.and_then(|other| other.path_in_map(own.at.time_s));
-        let target = path.as_ref().map(|path| path as &dyn Path);
-        let instant = &Instant { target, ..own.at.instant(track) };
-        let predicted = predict::sighting(model, instant, &own.seen);
+        let instant = &Instant { target: path.as_ref().map(|path| path as &dyn Path), ..plain };
+        let predicted = predict::sighting(model, instant, other.as_ref().unwrap_or(&own.seen));
         let context = Context {
             surroundings: instant.surroundings,
             ..Context::new(&model.nominal, instant.time_s, instant.motion.lift())
         };
-        let noise = sensors::noise(model, &context, predicted.range_m, predicted.bearing_rad);
+        let noise = chain::noise(model, &context, predicted.range_m, predicted.bearing_rad);
         let (value, sigma) = match part {
             Part::Range => (-predicted.range_m + own.measured, noise.range_sigma_m),
             Part::Bearing => ((-predicted.bearing_rad + own.measured).wrapped(), noise.bearing_sigma_rad),
@@ -127,6 +131,24 @@ pub(crate) fn residuals<S: Scalar>(
         channel.push(Residual::new(instant.time_s, own.at.regime, Some(own.target), &[value], &[sigma]));
     }
     channel
+}
+
+/// Whether a model gives wrong names to what is seen, always and not by chance.
+pub(crate) fn renames<S: Scalar>(model: &RobotModel<S>) -> bool {
+    model.effects.iter().any(|active| active.effect() == Effect::LandmarkIdentitySwap)
+}
+
+/// What a sighting of this name is of: the swap of two names undoes itself.
+pub(crate) fn actual<S: Scalar>(model: &RobotModel<S>, instant: &Instant, named: Target) -> Target {
+    let context = Context::new(&model.nominal, instant.time_s, instant.motion.lift());
+    let target = match named {
+        Target::Landmark(landmark) => signal::Target::Landmark(landmark.0),
+        Target::Robot(robot) => signal::Target::Robot(robot.0),
+    };
+    match chain::identity(model, &context, target, &[]) {
+        signal::Target::Landmark(landmark) => Target::Landmark(LandmarkId(landmark)),
+        signal::Target::Robot(robot) => Target::Robot(RobotId(robot)),
+    }
 }
 
 fn range_and_bearing(relative: &Relative) -> (Option<f64>, Option<f64>) {

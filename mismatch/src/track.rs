@@ -47,8 +47,10 @@ impl Track {
     /// Reckons by the encoders with the declared geometry, or without encoders by the velocities: over the
     /// few milliseconds that truth is carried, their errors do not matter.
     pub(crate) fn new(recording: &RobotRecording, model: &RobotModel<f64>, origin: Timestamp) -> Self {
-        let encoders: Vec<_> =
+        let mut encoders: Vec<_> =
             recording.odometry.iter().filter_map(|sample| encoder_sample(sample, origin)).collect();
+        let steer = recording.steer.iter().map(|own| (own.time.seconds_since(origin), own.angle_rad));
+        steer_wheels(&mut encoders, &steer.collect::<Vec<_>>());
         let ratio = match model.drive {
             Drive::SkidSteer { track_ratio } => track_ratio,
             Drive::Differential | Drive::CarLike { .. } => 1.0,
@@ -109,8 +111,8 @@ impl Track {
         motion.or_else(|| self.truth_missing())
     }
 
-    /// The wheels' angles at an instant: encoders are nearly free of noise, so they may be interpolated.
-    /// `None` outside the samples and in a pause.
+    /// The wheels' angles at an instant: encoders are nearly free of noise, so they may be interpolated, with
+    /// the acceleration between the steps before and after. `None` outside the samples and in a pause.
     pub(crate) fn wheels_at(&self, time_s: f64) -> Option<EncoderSample> {
         let after = self.encoders.partition_point(|sample| sample.time_s <= time_s);
         let before = *self.encoders.get(after.checked_sub(1)?)?;
@@ -121,10 +123,30 @@ impl Track {
         let next = self.encoders.get(after)?;
         let step_s = next.time_s - before.time_s;
         let share = since_s / step_s;
+        let bend = self.bend_rad(after - 1);
         let angle = |wheel: usize| {
-            before.angle_rad[wheel] + share * (next.angle_rad[wheel] - before.angle_rad[wheel])
+            let even = before.angle_rad[wheel] + share * (next.angle_rad[wheel] - before.angle_rad[wheel]);
+            even + share * (1.0 - share) * bend[wheel]
         };
-        (step_s <= self.pause_s).then(|| EncoderSample { time_s, angle_rad: [angle(0), angle(1)] })
+        let steer_rad = before.steer_rad + share * (next.steer_rad - before.steer_rad);
+        (step_s <= self.pause_s).then(|| EncoderSample { time_s, angle_rad: [angle(0), angle(1)], steer_rad })
+    }
+
+    /// By how much more than evenly each wheel has turned in the middle of the step that begins at a sample,
+    /// times four, radians.
+    fn bend_rad(&self, from: usize) -> [f64; 2] {
+        let samples = from.checked_sub(1).and_then(|first| self.encoders.get(first..from + 3));
+        let Some([before, from, to, after]) = samples else { return [0.0; 2] };
+        let spans_s = [from.time_s - before.time_s, to.time_s - from.time_s, after.time_s - to.time_s];
+        if spans_s.iter().any(|span_s| *span_s <= 0.0 || *span_s > self.pause_s) {
+            return [0.0; 2];
+        }
+        let reach_s = 0.5 * (spans_s[0] + spans_s[2]) + spans_s[1];
+        [0, 1].map(|wheel| {
+            let rate_before = (from.angle_rad[wheel] - before.angle_rad[wheel]) / spans_s[0];
+            let rate_after = (after.angle_rad[wheel] - to.angle_rad[wheel]) / spans_s[2];
+            -0.5 * spans_s[1] * spans_s[1] * (rate_after - rate_before) / reach_s
+        })
     }
 
     fn reckoned_at(&self, time_s: f64) -> Option<Reckoned> {
@@ -236,8 +258,25 @@ fn encoder_sample(sample: &Sample, origin: Timestamp) -> Option<EncoderSample> {
         Reading::Wheels { left_rad, right_rad } => Some(EncoderSample {
             time_s: sample.time.seconds_since(origin),
             angle_rad: [left_rad, right_rad],
+            steer_rad: 0.0,
         }),
         _ => None,
+    }
+}
+
+/// Gives every sample of the wheels its steering angle: interpolated between `(time, angle)`, and beyond the
+/// ends the nearest.
+fn steer_wheels(encoders: &mut [EncoderSample], steer: &[(f64, f64)]) {
+    for sample in encoders {
+        let after = steer.partition_point(|(time_s, _)| *time_s <= sample.time_s);
+        let before = after.checked_sub(1).and_then(|index| steer.get(index));
+        sample.steer_rad = match (before, steer.get(after)) {
+            (Some((from_s, from)), Some((to_s, to))) => {
+                from + (to - from) * (sample.time_s - from_s) / (to_s - from_s)
+            }
+            (Some((_, only)), None) | (None, Some((_, only))) => *only,
+            (None, None) => 0.0,
+        };
     }
 }
 

@@ -28,14 +28,15 @@ fn case(effect: Effect, values: &[f64]) -> Case<'_> {
 impl Case<'_> {
     /// The motion where encoders saw each `(v, w)` for a second.
     fn moved(&self, seconds: &[(f64, f64)]) -> Pose<f64> {
-        let mut samples = vec![EncoderSample { time_s: 0.0, angle_rad: [0.0; 2] }];
+        let mut samples =
+            vec![EncoderSample { time_s: 0.0, angle_rad: [0.0; 2], steer_rad: self.surroundings.steer_rad }];
         for &(speed, yaw_rate) in seconds {
             for _ in 0..100 {
                 let last = samples[samples.len() - 1];
                 let turn = yaw_rate * TRACK_M / 2.0;
                 let rates = [(speed - turn) / RADIUS_M, (speed + turn) / RADIUS_M];
                 let angle_rad = [0, 1].map(|wheel| last.angle_rad[wheel] + rates[wheel] * STEP_S);
-                samples.push(EncoderSample { time_s: last.time_s + STEP_S, angle_rad });
+                samples.push(EncoderSample { time_s: last.time_s + STEP_S, angle_rad, ..last });
             }
         }
         let effect = ActiveEffect::new(self.effect, self.values).unwrap();

@@ -88,11 +88,11 @@ fn a_clock_drift_grows_with_time() {
 #[test]
 fn clock_offset_and_truth_latency_are_opposite_for_one_robot() {
     let rate = |i: i32| if i < 10 { [6.0, 9.0] } else { [11.0, 5.0] };
-    let mut samples = vec![EncoderSample { time_s: 0.0, angle_rad: [0.0; 2] }];
+    let mut samples = vec![EncoderSample { time_s: 0.0, angle_rad: [0.0; 2], steer_rad: 0.0 }];
     for i in 0..20 {
         let last = samples[samples.len() - 1];
         let angle_rad = [0, 1].map(|wheel: usize| last.angle_rad[wheel] + 0.05 * rate(i)[wheel]);
-        samples.push(EncoderSample { time_s: last.time_s + 0.05, angle_rad });
+        samples.push(EncoderSample { time_s: last.time_s + 0.05, angle_rad, ..last });
     }
     let window = BodyWindow::whole(&samples, Pose::identity(), Surroundings::default());
     let change = |effect, value: f64| {

@@ -4,7 +4,7 @@ use pleiad_estimation::Timestamp;
 use pleiad_estimation::sample::{Reading, Relative, Sample};
 
 use crate::report::{FileReport, Gaps};
-use crate::types::{Command, TruthSample};
+use crate::types::{Command, SteerSample, TruthSample};
 
 /// A row with a stamp.
 pub(crate) trait Stamped: Copy + PartialEq {
@@ -18,6 +18,12 @@ pub(crate) trait Stamped: Copy + PartialEq {
 }
 
 impl Stamped for Command {
+    fn time(&self) -> Timestamp {
+        self.time
+    }
+}
+
+impl Stamped for SteerSample {
     fn time(&self) -> Timestamp {
         self.time
     }

@@ -36,6 +36,8 @@ pub struct RobotRecording {
     pub heading: Vec<Sample>,
     /// `Sighting` readings; several may share one stamp.
     pub sightings: Vec<Sample>,
+    /// Steering angles; empty unless the robot steers its wheels.
+    pub steer: Vec<SteerSample>,
     /// Ground truth, for judging only: no estimator ever sees it.
     pub truth: Vec<TruthSample>,
 }
@@ -49,6 +51,15 @@ pub struct Command {
     pub forward_m_s: f64,
     /// Yaw rate, rad/s.
     pub yaw_rate_rad_s: f64,
+}
+
+/// How far the front wheels were steered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SteerSample {
+    /// When.
+    pub time: Timestamp,
+    /// Counter-clockwise from straight ahead, radians.
+    pub angle_rad: f64,
 }
 
 /// Where the robot really was.

@@ -70,6 +70,7 @@ impl RobotRecording {
             gps: part(&self.gps, start, end),
             heading: part(&self.heading, start, end),
             sightings: part(&self.sightings, start, end),
+            steer: part(&self.steer, start, end),
             truth: part(&self.truth, start, end),
         }
     }

@@ -1,5 +1,5 @@
-//! What the agent of a simulated robot has to be told: the geometry, the noises and the start that its
-//! world was made with.
+//! What the agent of a simulated robot has to be told: the geometry that is declared of it, the noises and
+//! the start that its world was made with.
 
 use pleiad_agent::config::{
     AngleNoise, LengthNoise, MotionSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection,
@@ -14,9 +14,11 @@ const LEAST_LIMIT: f64 = 0.1;
 /// `[motion]` of a simulated robot.
 pub fn motion(settings: &RobotSettings) -> MotionSection {
     let noise = &settings.odometry.noise;
+    let declared = &settings.declared;
+    let track_width_m = declared.track_width.unwrap_or(settings.track_width_m);
     MotionSection {
-        wheel_radius_m: Some(settings.wheel_radius_m),
-        track_width_m: Some(settings.track_width_m),
+        wheel_radius_m: Some(declared.wheel_radius.unwrap_or(settings.wheel_radius_m)),
+        track_width_m: Some(settings.drive.effective_track_m(track_width_m)),
         forward_m_per_sqrt_s: noise.speed_m_per_sqrt_s,
         lateral_m_per_sqrt_s: noise.lateral_m_per_sqrt_s,
         yaw_rad_per_sqrt_s: noise.yaw_rad_per_sqrt_s,

@@ -14,6 +14,8 @@ mod help;
 mod json;
 #[path = "command_line/models.rs"]
 mod models;
+#[path = "command_line/simulate.rs"]
+mod simulate;
 
 use std::path::Path;
 

@@ -15,7 +15,7 @@ use crate::diagnosis::unit::{Column, Row, Stretch, Unit};
 const IMPULSES: usize = 8;
 
 /// Columns per unit that an effect acts on: the unit's position and its columns.
-pub(crate) type Columns = Vec<(usize, Vec<Column>)>;
+pub(crate) type Columns = Vec<(usize, Arc<Vec<Column>>)>;
 
 /// A start of an effect with its columns.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ pub(crate) struct Candidate {
     /// values of the term.
     pub(crate) along: Vec<usize>,
     /// Columns, of the effect always and everywhere if it has an onset or a region.
-    base: Arc<Columns>,
+    base: Columns,
     /// Whether rows before the onset or outside the region of the term are to be blanked.
     masked: bool,
 }
@@ -34,7 +34,7 @@ impl Candidate {
     /// The columns at the onset and in the region of the term.
     pub(crate) fn columns(&self, units: &[&Unit<'_>]) -> Columns {
         if !self.masked {
-            return (*self.base).clone();
+            return self.base.clone();
         }
         let placing = Placing::of(self.term.effect.info());
         let values = &self.term.values;
@@ -56,10 +56,22 @@ impl Candidate {
             };
             Column { parts: column.parts.iter().zip(&unit.stretches).map(part).collect() }
         };
-        let of_unit = |(unit, columns): &(usize, Vec<Column>)| {
-            (*unit, columns.iter().map(|column| blank(units[*unit], column)).collect())
+        let of_unit = |(unit, columns): &(usize, Arc<Vec<Column>>)| {
+            let blanked: Vec<Column> = columns.iter().map(|column| blank(units[*unit], column)).collect();
+            (*unit, Arc::new(blanked))
         };
         self.base.iter().map(of_unit).collect()
+    }
+
+    /// The same where only some units are looked at: `own` are their positions so far.
+    pub(crate) fn renumbered(&self, own: &[usize]) -> Self {
+        let place = |unit: usize| own.iter().position(|known| *known == unit);
+        let base = self
+            .base
+            .iter()
+            .filter_map(|(unit, columns)| Some((place(*unit)?, Arc::clone(columns))))
+            .collect();
+        Self { term: self.term.clone(), along: self.along.clone(), base, masked: self.masked }
     }
 
     /// Whether onset or region can be moved without a new linearization.
@@ -202,6 +214,6 @@ fn shown(mut term: Term, start: &Start, own: &[usize], columns: Vec<Vec<Column>>
     let keep = |columns: Vec<Column>| -> Vec<Column> {
         columns.into_iter().zip(&shows).filter(|(_, shows)| **shows).map(|(column, _)| column).collect()
     };
-    let columns: Columns = own.iter().copied().zip(columns.into_iter().map(keep)).collect();
-    Some(Candidate { term, along, base: Arc::new(columns), masked: false })
+    let base = own.iter().copied().zip(columns.into_iter().map(keep).map(Arc::new)).collect();
+    Some(Candidate { term, along, base, masked: false })
 }

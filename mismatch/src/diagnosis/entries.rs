@@ -64,7 +64,8 @@ pub(crate) fn is_shared(info: &EffectInfo) -> bool {
 /// Why an effect cannot be tested on a unit.
 fn obstacle(effect: Effect, unit: &Unit<'_>) -> Option<String> {
     let info = effect.info();
-    if info.channels.contains(&Needed::Steer) {
+    let steered = unit.evidence.robot(unit.robot).is_some_and(|(own, _)| !own.steer.is_empty());
+    if info.channels.contains(&Needed::Steer) && !steered {
         return Some("the steering angle was not recorded".to_owned());
     }
     let shows = |channel: &Channel| touches(effect, *channel) && unit.stretch(*channel).is_some();

@@ -6,16 +6,31 @@ use pleiad_physics::Variable;
 
 use crate::channel::Channel;
 use crate::diagnosis::noise::{self, Noise};
+use crate::diagnosis::starts::Placing;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Column, Unit};
 
-/// Largest number of re-linearizations.
-const ITERATIONS: usize = 15;
-/// A fit has converged if a step lowers the cost by less than this.
-const CONVERGED: f64 = 1e-4;
+/// A linearization is kept as long as steps lower the cost by less than this.
+const RELINEARIZE: f64 = 0.5;
 /// Steps are given up at this damping.
 const MAX_DAMPING: f64 = 1e8;
+
+/// How hard a fit tries.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    /// The most steps.
+    steps: usize,
+    /// It has converged if a step lowers the cost by less than this.
+    converged: f64,
+}
+
+impl Effort {
+    /// For what is kept.
+    pub(crate) const FULL: Self = Self { steps: 20, converged: 1e-4 };
+    /// For telling rivals apart: their log-likelihood to a few hundredths.
+    pub(crate) const RIVAL: Self = Self { steps: 10, converged: 0.02 };
+}
 
 /// A parameter: the position of its term and its position in the term.
 pub(crate) type Slot = (usize, usize);
@@ -41,6 +56,15 @@ pub(crate) struct Fit {
     pub(crate) log_likelihood: f64,
 }
 
+impl Fit {
+    /// How many parameters of the last term were fitted, or searched because they are onset, place or threshold.
+    pub(crate) fn parameters_of_last(&self) -> usize {
+        let Some(last) = self.terms.len().checked_sub(1) else { return 0 };
+        let fitted = self.slots.iter().filter(|(term, _)| *term == last).count();
+        (fitted + Placing::of(self.terms[last].effect.info()).count()).max(1)
+    }
+}
+
 /// Residuals of every unit under terms; `None` if a prediction is no finite number.
 pub(crate) fn states(units: &[&Unit<'_>], terms: &[Term]) -> Option<Vec<State>> {
     let state = |unit: &&Unit<'_>| {
@@ -48,6 +72,16 @@ pub(crate) fn states(units: &[&Unit<'_>], terms: &[Term]) -> Option<Vec<State>> 
         Some(State { noise: noise::estimate(unit, &residuals), residuals })
     };
     units.iter().map(state).collect()
+}
+
+/// The states of units to whose terms one is added.
+pub(crate) fn with_another(units: &[&Unit<'_>], known: &[State], terms: &[Term]) -> Option<Vec<State>> {
+    let added = terms.last()?.effect;
+    let state = |(unit, state): (&&Unit<'_>, &State)| {
+        let residuals = residuals(unit, terms, &|channel| touches(added, channel), Some(&state.residuals))?;
+        Some(State { noise: noise::estimate(unit, &residuals), residuals })
+    };
+    units.iter().zip(known).map(state).collect()
 }
 
 /// Residuals of a unit; those of channels that are not asked for are taken from `known`.
@@ -70,19 +104,27 @@ pub(crate) fn residuals(
     Some(all)
 }
 
-/// Fits the terms for which `movable` holds, starting at their values and, if given, at what the units look
-/// like under them. `None` if the model predicts no finite numbers at the start.
+/// Fits the terms for which `movable` holds, starting at their values. `None` if the model predicts no finite
+/// numbers at the start.
 pub(crate) fn fit(
     units: &[&Unit<'_>],
     terms: Vec<Term>,
     movable: &dyn Fn(usize) -> bool,
-    from: Option<Vec<State>>,
+    effort: Effort,
 ) -> Option<Fit> {
-    let mut terms = terms;
-    let mut states = match from {
-        Some(states) => states,
-        None => states_of(units, &terms)?,
-    };
+    let states = states(units, &terms)?;
+    fit_from(units, terms, states, movable, effort)
+}
+
+/// The same from what the units look like under the terms.
+pub(crate) fn fit_from(
+    units: &[&Unit<'_>],
+    terms: Vec<Term>,
+    states: Vec<State>,
+    movable: &dyn Fn(usize) -> bool,
+    effort: Effort,
+) -> Option<Fit> {
+    let (mut terms, mut states) = (terms, states);
     let mut slots = free_slots(&terms, movable);
     let mut found = all_columns(units, &terms, &slots);
     // What shows nowhere cannot be fitted.
@@ -93,7 +135,7 @@ pub(crate) fn fit(
         keep(columns, &shows);
     }
     let mut damping = 1e-4;
-    for _ in 0..ITERATIONS {
+    for _ in 0..effort.steps {
         if slots.is_empty() {
             break;
         }
@@ -104,16 +146,16 @@ pub(crate) fn fit(
             state.noise = noise::estimate(unit, &residuals);
             state.residuals = residuals;
         }
-        found = all_columns(units, &terms, &slots);
-        if step.gain < CONVERGED {
+        if step.gain > RELINEARIZE {
+            found = all_columns(units, &terms, &slots);
+        }
+        if step.gain < effort.converged {
             break;
         }
     }
     let log_likelihood = states.iter().map(|state| state.noise.log_likelihood).sum();
     Some(Fit { terms, states, slots, columns: found, log_likelihood })
 }
-
-use self::states as states_of;
 
 struct Step {
     terms: Vec<Term>,

@@ -15,7 +15,7 @@ use crate::diagnosis::unit::Unit;
 /// How many folds.
 pub(crate) const FOLDS: usize = 5;
 /// Nothing this close to a fold is fitted, seconds.
-const EMBARGO_S: f64 = 5.0;
+pub(crate) const EMBARGO_S: f64 = 5.0;
 
 /// A gain of log score with its standard error.
 #[derive(Clone, Copy, Debug, Default)]
@@ -112,7 +112,7 @@ pub(crate) fn gain(with: &State, without: &State, index: usize) -> f64 {
 }
 
 /// Sum over blocks; its variance with the covariance of neighbours (`newey1987`, one lag).
-fn summed(units: &[Vec<f64>]) -> Gain {
+pub(crate) fn summed(units: &[Vec<f64>]) -> Gain {
     let total: f64 = units.iter().flatten().sum();
     let count = units.iter().map(Vec::len).sum::<usize>().max(1) as f64;
     let mean = total / count;

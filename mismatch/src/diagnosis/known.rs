@@ -11,7 +11,7 @@ use pleiad_recording::Recording;
 use crate::builtin;
 use crate::diagnosis::candidate::candidates;
 use crate::diagnosis::entries::is_shared;
-use crate::diagnosis::fit::{Fit, fit};
+use crate::diagnosis::fit::{Effort, Fit, fit};
 use crate::diagnosis::naming::Estimated;
 use crate::diagnosis::profile::{Profile, polish};
 use crate::diagnosis::refine::refine;
@@ -97,13 +97,13 @@ pub fn fit_known(
     let all: Vec<Unit<'_>> = concerned.map(|(&own, model)| unit(0, &prepared, own, model)).collect();
     let units: Vec<&Unit<'_>> = all.iter().filter(|unit| !unit.rows.is_empty()).collect();
 
-    let Some(mut current) = fit(&units, Vec::new(), &|_| true, None) else { return Ok(Vec::new()) };
+    let Some(mut current) = fit(&units, Vec::new(), &|_| true, Effort::FULL) else { return Ok(Vec::new()) };
     for &effect in effects {
         let whose = if is_shared(effect.info()) { Whose::Everyone } else { Whose::Robot(robot) };
         if let Some(term) = found(&units, &current, effect, whose) {
             let mut terms = current.terms.clone();
             terms.push(term);
-            current = fit(&units, terms, &|_| true, None).unwrap_or(current);
+            current = fit(&units, terms, &|_| true, Effort::FULL).unwrap_or(current);
         }
     }
     let current = polish(&units, current);

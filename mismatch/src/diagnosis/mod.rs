@@ -2,7 +2,8 @@
 //!
 //! [`unit`] makes one long vector of a robot's residuals, [`fit`] fits effects to it, [`candidate`] and
 //! [`starts`] say what could be added, [`white`] tests it, [`select`] adds and prunes, [`support`],
-//! [`held_out`] and [`naming`] decide what may be said of it, [`run`] joins them.
+//! [`held_out`] and [`naming`] decide what may be said of it, [`spread`] does the same for effects that leave the
+//! mean of the residuals where it is, [`run`] joins them.
 
 mod candidate;
 mod chi_square;
@@ -21,6 +22,7 @@ mod rolled;
 mod run;
 mod select;
 mod series;
+mod spread;
 mod starts;
 mod support;
 mod term;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use nalgebra::DMatrix;
-use pleiad_physics::{Effect, Parameter, Scalar};
+use pleiad_physics::{Channel as Needed, Effect, Parameter, Scalar};
 
 use crate::channel::Channel;
 use crate::diagnosis::chi_square::upper_tail;
@@ -21,9 +21,9 @@ use crate::findings::{Estimate, Place, Verdict};
 /// Half the width of a 95 % interval, in standard errors.
 pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
 /// The near end of this many standard errors must be beyond the threshold of relevance.
-const NEAR_END: f64 = 3.0;
+pub(crate) const NEAR_END: f64 = 3.0;
 /// The cross-fitted gain must exceed this many standard errors.
-const GAIN_ERRORS: f64 = 2.0;
+pub(crate) const GAIN_ERRORS: f64 = 2.0;
 /// An effect without a threshold of relevance must change this share of a channel by more than a sigma.
 const LEAST_SHARE_CHANGED: f64 = 0.005;
 /// A place or regime is named if this share of the gain arises there.
@@ -90,6 +90,11 @@ impl Estimated {
         self.term.parameters().iter().enumerate().filter_map(one).collect()
     }
 
+    /// Whether the term can be relevant to a unit at all.
+    pub(crate) fn may_be_relevant(&self, unit: &Unit<'_>) -> bool {
+        self.is_relevant(unit).unwrap_or(true)
+    }
+
     /// Whether the near end of some parameter is beyond its threshold of relevance; `None` if no parameter
     /// has one.
     fn is_relevant(&self, unit: &Unit<'_>) -> Option<bool> {
@@ -109,7 +114,10 @@ impl Estimated {
 /// How a term fares under the rules of evidence.
 #[derive(Clone, Debug)]
 pub(crate) struct Judged {
-    pub(crate) estimated: Estimated,
+    /// The parameters of its terms, the main one first.
+    pub(crate) estimated: Vec<Estimated>,
+    /// A parameter that only the terms together have.
+    pub(crate) total: Option<(String, Estimate)>,
     pub(crate) verdict: Option<Verdict>,
     pub(crate) p_familywise: f64,
     pub(crate) channel: Channel,
@@ -118,34 +126,36 @@ pub(crate) struct Judged {
     pub(crate) one_off: bool,
 }
 
-/// Judges a term. `verdict` is `None` for a nuisance: significant, but too small, or of no use on data that
-/// it was not fitted on.
-pub(crate) fn judge(
-    units: &[&Unit<'_>],
-    support: &Support,
-    estimated: Estimated,
-    full: (&Fit, &DMatrix<f64>, usize),
-    gain: Gain,
-    tests: usize,
-) -> Judged {
+/// Judges terms that make one finding. `verdict` is `None` for a nuisance: significant, but too small, or of
+/// no use on data that it was not fitted on.
+pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: usize) -> Judged {
+    let (fit, covariance, group) = (&support.with, &support.covariance, &support.group);
+    let estimated: Vec<Estimated> =
+        group.iter().map(|&position| Estimated::of(fit, covariance, position)).collect();
     let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
-    let parameters = estimated.errors.iter().flatten().count().max(1);
+    let parameters = estimated.iter().flat_map(|own| own.errors.iter().flatten()).count().max(1);
     let ratio =
         2.0 * (support.with.log_likelihood - support.without.log_likelihood) / support.inflation;
     let p_ratio = upper_tail(ratio, parameters);
-    let p_wald = wald(full.0, full.1, full.2).map_or(0.0, |(wald, count)| upper_tail(wald, count));
+    let p_wald = wald(fit, covariance, group).map_or(0.0, |(wald, count)| upper_tail(wald, count));
     let p_familywise = (p_ratio.max(p_wald) * tests as f64).min(1.0);
-    let effect = estimated.term.effect;
+    let main = &estimated[0];
+    let effect = main.term.effect;
     let one_off = is_impulse(effect);
+    let total = total(fit, covariance, group);
     let relevant = acting
         .iter()
-        .filter_map(|unit| estimated.is_relevant(unit))
+        .flat_map(|unit| estimated.iter().filter_map(|own| own.is_relevant(unit)))
         .reduce(|a, b| a || b)
-        .unwrap_or_else(|| changes_enough(&acting, support));
+        .unwrap_or_else(|| changes_enough(&acting, support))
+        || total.as_ref().is_some_and(|(_, total)| total.ci95[0] > 0.0);
     let useful = one_off || gain.total > GAIN_ERRORS * gain.standard_error;
     let named = p_familywise < FAMILYWISE && relevant && useful;
+    // Without encoders a name that needs them can only be a member of a set.
+    let unseen = effect.info().channels.contains(&Needed::Encoders)
+        && acting.iter().all(|unit| unit.stretch(Channel::CommandedBody).is_some());
     let verdict = named.then(|| {
-        if support.members.len() > 1 {
+        if support.members.len() > 1 || unseen {
             Verdict::CannotTell
         } else if effect.info().bad_data {
             Verdict::BadData
@@ -153,8 +163,51 @@ pub(crate) fn judge(
             Verdict::Named
         }
     });
-    let place = place(&acting, support, &estimated.term);
-    Judged { estimated, verdict, p_familywise, channel: channel(&acting, support), place, one_off }
+    let place = place(&acting, support, &main.term);
+    let channel = channel(&acting, support);
+    Judged { estimated, total, verdict, p_familywise, channel, place, one_off }
+}
+
+/// Lag and delay together: without encoders their sum is known far better than either.
+fn total(fit: &Fit, covariance: &DMatrix<f64>, group: &[usize]) -> Option<(String, Estimate)> {
+    let &[first, second] = group else { return None };
+    let [a, b] = [first, second].map(|term| fit.slots.iter().position(|slot| *slot == (term, 0)));
+    let (a, b) = (a?, b?);
+    let variance = covariance[(a, a)] + covariance[(b, b)] + 2.0 * covariance[(a, b)];
+    let value = fit.terms[first].values[0] + fit.terms[second].values[0];
+    let half = Z_95 * variance.max(0.0).sqrt();
+    Some(("total_s".to_owned(), Estimate { value, unit: "s".to_owned(), ci95: [value - half, value + half] }))
+}
+
+/// Terms that make one finding: without encoders, lag and delay of a robot; else each its own.
+pub(crate) fn groups(units: &[&Unit<'_>], terms: &[Term]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (position, term) in terms.iter().enumerate() {
+        let partner = groups.iter_mut().find(|group| {
+            let other = &terms[group[0]];
+            group.len() == 1 && twin(term.effect) == Some(other.effect) && other.whose == term.whose
+        });
+        match partner {
+            Some(group) if is_unseen(units, term) => group.push(position),
+            _ => groups.push(vec![position]),
+        }
+    }
+    groups
+}
+
+/// The effect that cannot be told from another without encoders.
+pub(crate) fn twin(effect: Effect) -> Option<Effect> {
+    match effect {
+        Effect::ActuatorLag => Some(Effect::CommandDelay),
+        Effect::CommandDelay => Some(Effect::ActuatorLag),
+        _ => None,
+    }
+}
+
+/// Whether a term acts on robots without encoders only.
+pub(crate) fn is_unseen(units: &[&Unit<'_>], term: &Term) -> bool {
+    let mut acting = units.iter().filter(|unit| term.acts_on(unit.robot)).peekable();
+    acting.peek().is_some() && acting.all(|unit| unit.stretch(Channel::CommandedBody).is_some())
 }
 
 /// Effects of one instant.

@@ -11,7 +11,7 @@ use crate::diagnosis::unit::Unit;
 use crate::findings::Undetected;
 
 /// Quantile of the standard normal at a power of 80 %.
-const POWER_80: f64 = 0.841_621_233_572_914;
+pub(crate) const POWER_80: f64 = 0.841_621_233_572_914;
 /// Standard errors by which an estimate must exceed the threshold of relevance.
 const NEAR_END: f64 = 3.0;
 

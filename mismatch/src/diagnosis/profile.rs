@@ -5,7 +5,7 @@
 
 use pleiad_physics::{Fit as How, Parameter};
 
-use crate::diagnosis::fit::{Fit, Normal, Slot, State, columns, fit, residuals};
+use crate::diagnosis::fit::{Effort, Fit, Normal, Slot, State, columns, fit, residuals};
 use crate::diagnosis::noise;
 use crate::diagnosis::starts::{Placing, thresholds};
 use crate::diagnosis::term::Term;
@@ -143,7 +143,7 @@ pub(crate) fn polish(units: &[&Unit<'_>], mut current: Fit) -> Fit {
             current.terms[slot.0].values[slot.1] = value;
             let mut terms = current.terms.clone();
             terms[slot.0].values[slot.1] = value;
-            match fit(units, terms, &|_| true, None) {
+            match fit(units, terms, &|_| true, Effort::FULL) {
                 Some(next) => current = next,
                 None => return current,
             }
@@ -163,7 +163,7 @@ fn best(profile: &Profile<'_, '_>, slot: Slot) -> f64 {
     let mut value = term.values[slot.1];
     let mut most = at(value);
     if !placed {
-        for other in thresholds(parameter) {
+        for other in thresholds(parameter, profile.units) {
             let there = at(other);
             if there > most {
                 (value, most) = (other, there);

@@ -3,28 +3,29 @@
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
-use pleiad_physics::Effect;
+use pleiad_physics::{Channel as Needed, Effect, Stage};
 
 use crate::diagnosis::candidate::{Candidate, candidates};
 use crate::diagnosis::chi_square::upper_tail;
-use crate::diagnosis::fit::{Fit, fit};
+use crate::diagnosis::fit::{Effort, Fit, Slot, State, fit, fit_from, with_another};
 use crate::diagnosis::parallel;
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::term::{Term, Whose};
-use crate::diagnosis::touch::touches;
-use crate::diagnosis::unit::Unit;
+use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{Step, White, step};
 
 /// Probability that anything is found in a clean recording, over everything that is tried in it.
 pub(crate) const FAMILYWISE: f64 = 0.002;
 /// An effect enters only if it gains more than this, twice in log-likelihood.
-const LEAST_GAIN: f64 = 20.0;
+pub(crate) const LEAST_GAIN: f64 = 20.0;
 /// A term is dropped if it is this likely without the effect.
 const PRUNE: f64 = 1e-4;
+/// A rival that gains less than this share of the best one by linearization is not fitted.
+const LEAST_SHARE: f64 = 0.4;
 /// So many rivals are fitted before one is chosen.
 const RIVALS: usize = 8;
-/// The most terms of a robot.
-const MOST_TERMS: usize = 12;
+/// The most rounds of additions.
+const MOST_ROUNDS: usize = 24;
 /// A step from "off" to a start is a sound guess if the data want between these multiples of it.
 const SOUND_STEP: std::ops::RangeInclusive<f64> = 0.2..=4.0;
 
@@ -45,39 +46,49 @@ pub(crate) struct Selected {
     pub(crate) fit: Fit,
     /// How many starts were tried: what a probability is multiplied by.
     pub(crate) tests: usize,
+    /// What could be added, linearized beside the terms that were found.
+    pub(crate) pool: Pool,
 }
 
 /// Adds effects from `entries` as long as one is significant; prunes.
 pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry]) -> Option<Selected> {
-    let mut current = fit(units, Vec::new(), &|_| true, None)?;
+    let mut current = fit(units, Vec::new(), &|_| true, Effort::FULL)?;
     let mut pool = Pool::default();
     let mut tests = 0;
-    for _ in 0..MOST_TERMS {
+    for _ in 0..MOST_ROUNDS {
         let scored = pool.scored(units, entries, &current);
         tests = tests.max(scored.len());
         let whites = whites(units, &current);
         let added = additions(units, &whites, &current, &scored, tests);
         if added.is_empty() {
-            break;
+            // Nothing by linearizations that may be stale: once more by fresh ones.
+            if pool.is_fresh(&current.terms) {
+                break;
+            }
+            pool = Pool::default();
+            continue;
         }
-        let mut terms = current.terms.clone();
-        terms.extend(added);
-        current = fit(units, terms, &|_| true, None)?;
-        pool.forget(&current.terms);
+        for fit in added {
+            pool.forget(fit.terms.last()?);
+            current = joined(units, &current, &fit)?;
+        }
     }
+    let current = fit(units, current.terms, &|_| true, Effort::FULL)?;
     let fit = prune(units, current)?;
-    Some(Selected { fit, tests })
+    Some(Selected { fit, tests, pool })
 }
 
-/// Linearized candidates, kept as long as no term is added that shows in the same channels.
+/// Linearized candidates. What is linear enough is kept when terms are added: it serves to choose whom to fit.
 #[derive(Default)]
-struct Pool {
+pub(crate) struct Pool {
     known: BTreeMap<Entry, Vec<Candidate>>,
-    terms: usize,
+    /// How many terms there were when the oldest of them was linearized.
+    terms: Option<usize>,
 }
 
 impl Pool {
-    fn scored(&mut self, units: &[&Unit<'_>], entries: &[Entry], current: &Fit) -> Vec<Scored> {
+    /// Every candidate of the entries that are not among the terms of a fit, scored.
+    pub(crate) fn scored(&mut self, units: &[&Unit<'_>], entries: &[Entry], current: &Fit) -> Vec<Scored> {
         let open: Vec<Entry> = entries
             .iter()
             .copied()
@@ -90,26 +101,37 @@ impl Pool {
         let found = parallel::map(&missing, |&(effect, whose)| {
             candidates(effect, whose, units, &current.terms, &current.states)
         });
+        if self.known.is_empty() {
+            self.terms = Some(current.terms.len());
+        }
         self.known.extend(missing.into_iter().zip(found));
         let whites: Vec<White<'_, '_>> = whites(units, current);
         let scores = parallel::map(&open, |entry| {
-            self.known[entry].iter().filter_map(|candidate| score(units, &whites, candidate)).collect::<Vec<_>>()
+            self.known[entry]
+                .iter()
+                .filter_map(|candidate| score(units, &whites, candidate))
+                .collect::<Vec<_>>()
         });
         scores.into_iter().flatten().collect()
     }
 
-    /// Forgets what the terms added last have changed.
-    fn forget(&mut self, terms: &[Term]) {
-        let added = &terms[self.terms.min(terms.len())..];
+    /// Every candidate, whether or not it adds anything to a fit.
+    pub(crate) fn candidates(&self) -> impl Iterator<Item = &Candidate> {
+        self.known.values().flatten()
+    }
+
+    /// Whether every candidate was linearized beside these terms.
+    fn is_fresh(&self, terms: &[Term]) -> bool {
+        self.terms == Some(terms.len())
+    }
+
+    /// Forgets candidates that added terms have changed much: a servo that answers otherwise or later moves
+    /// every effect between command and wheel in time.
+    fn forget(&mut self, added: &Term) {
+        let servo = added.effect.info().stage == Stage::Actuator;
         self.known.retain(|&(effect, whose), _| {
-            !added.iter().any(|term| {
-                overlap(term.whose, whose)
-                    && crate::channel::Channel::ALL.iter().any(|&channel| {
-                        touches(effect, channel) && touches(term.effect, channel)
-                    })
-            })
+            !(servo && overlap(added.whose, whose) && effect.info().channels.contains(&Needed::Command))
         });
-        self.terms = terms.len();
     }
 }
 
@@ -190,7 +212,7 @@ fn additions(
     current: &Fit,
     scored: &[Scored],
     tests: usize,
-) -> Vec<Term> {
+) -> Vec<Fit> {
     let strong = significant(scored, tests);
     let shared: Vec<&Scored> =
         strong.iter().copied().filter(|one| one.candidate.term.whose == Whose::Everyone).collect();
@@ -203,7 +225,8 @@ fn additions(
     if let Some(gain) = best_shared
         && groups.values().all(|own| own[0].step.gain < gain)
     {
-        return choose(units, whites, current, &shared).into_iter().collect();
+        // What shows on one robot alone may be its own.
+        return choose(units, whites, current, &strong).into_iter().collect();
     }
     // A robot waits if what it shows may be its share of an effect of the world.
     let sharers = units.len().max(1) as f64;
@@ -220,23 +243,62 @@ fn choose(
     whites: &[White<'_, '_>],
     current: &Fit,
     rivals: &[&Scored],
-) -> Option<Term> {
-    let rivals = &rivals[..rivals.len().min(RIVALS)];
+) -> Option<Fit> {
+    let best = rivals.first()?.step.gain;
+    let close = rivals.iter().take_while(|rival| rival.step.gain > LEAST_SHARE * best).count();
+    let rivals = &rivals[..close.min(RIVALS)];
     let inflation = rivals.iter().map(|rival| rival.step.inflation).fold(f64::INFINITY, f64::min).max(1.0);
-    let fitted: Vec<Option<(f64, Term)>> = parallel::map(rivals, |rival| {
+    let fitted: Vec<Option<(f64, Fit)>> = parallel::map(rivals, |rival| {
         let rival = refine(units, whites, rival);
         let added = fit_beside(units, current, rival.term())?;
-        let term = added.terms.last()?.clone();
-        Some((criterion(units, &added, inflation, term.whose), term))
+        added.terms.last()?.is_inside().then(|| (criterion(units, current, &added, inflation), added))
     });
     // Of equals the first: the one whose linearization was the strongest.
-    let mut best: Option<(f64, Term)> = None;
-    for (value, term) in fitted.into_iter().flatten() {
+    let mut best: Option<(f64, Fit)> = None;
+    for (value, fit) in fitted.into_iter().flatten() {
         if best.as_ref().is_none_or(|(most, _)| value > *most) {
-            best = Some((value, term));
+            best = Some((value, fit));
         }
     }
-    best.map(|(_, term)| term)
+    best.map(|(_, fit)| fit)
+}
+
+/// A fit in which some units and their terms are replaced by those of another, which has one more term.
+fn joined(units: &[&Unit<'_>], whole: &Fit, part: &Fit) -> Option<Fit> {
+    let added = part.terms.last()?;
+    let mut terms = whole.terms.clone();
+    // The position in the whole of each term of the part.
+    let mut place = Vec::with_capacity(part.terms.len());
+    for term in &part.terms[..part.terms.len() - 1] {
+        let known = terms.iter().position(|own| own.effect == term.effect && own.whose == term.whose)?;
+        terms[known] = term.clone();
+        place.push(known);
+    }
+    place.push(terms.len());
+    terms.push(added.clone());
+    let placed = |&(term, parameter): &Slot| (place[term], parameter);
+    let mut slots = whole.slots.clone();
+    slots.extend(part.slots.iter().map(placed).filter(|slot| !whole.slots.contains(slot)));
+    let mut columns: Vec<Vec<Column>> = Vec::with_capacity(units.len());
+    let mut states: Vec<State> = Vec::with_capacity(units.len());
+    let mut mine = part.states.iter().zip(&part.columns);
+    for (index, unit) in units.iter().enumerate() {
+        let mut own = whole.columns[index].clone();
+        own.resize(slots.len(), Column::empty(unit));
+        if added.acts_on(unit.robot) {
+            let (state, fitted) = mine.next()?;
+            for (slot, column) in part.slots.iter().zip(fitted) {
+                let position = slots.iter().position(|known| *known == placed(slot))?;
+                own[position] = column.clone();
+            }
+            states.push(state.clone());
+        } else {
+            states.push(whole.states[index].clone());
+        }
+        columns.push(own);
+    }
+    let log_likelihood = states.iter().map(|state| state.noise.log_likelihood).sum();
+    Some(Fit { terms, states, slots, columns, log_likelihood })
 }
 
 /// Fits a term beside those of a fit; of the units, those that it acts on.
@@ -250,18 +312,22 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
     // What other robots share stays where it is.
     let movable: Vec<bool> =
         terms.iter().map(|term| whose == Whose::Everyone || term.whose == whose).collect();
-    fit(&acting, terms, &|index| movable[index], None)
+    let known: Vec<State> = own.iter().map(|&unit| current.states[unit].clone()).collect();
+    let states = with_another(&acting, &known, &terms)?;
+    fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL)
 }
 
-/// Bayes' information criterion on the effective sample size; more is better.
-fn criterion(units: &[&Unit<'_>], fit: &Fit, inflation: f64, whose: Whose) -> f64 {
-    let rows: usize = units
-        .iter()
-        .filter(|unit| overlap(whose, Whose::Robot(unit.robot)))
-        .map(|unit| unit.rows.len())
-        .sum();
+/// What a fit with one more term gains by Bayes' information criterion on the effective sample size; more is
+/// better. Rivals may act on other robots.
+fn criterion(units: &[&Unit<'_>], current: &Fit, added: &Fit, inflation: f64) -> f64 {
+    let Some(term) = added.terms.last() else { return f64::NEG_INFINITY };
+    let (mut rows, mut before) = (0, 0.0);
+    for (unit, state) in units.iter().zip(&current.states).filter(|(unit, _)| term.acts_on(unit.robot)) {
+        rows += unit.rows.len();
+        before += state.noise.log_likelihood;
+    }
     let effective = (rows as f64 / inflation).max(2.0);
-    2.0 * fit.log_likelihood / inflation - fit.slots.len() as f64 * effective.ln()
+    2.0 * (added.log_likelihood - before) / inflation - added.parameters_of_last() as f64 * effective.ln()
 }
 
 /// The robust covariance of all fitted parameters, in the order of the slots.
@@ -273,19 +339,26 @@ pub(crate) fn covariance(units: &[&Unit<'_>], fit: &Fit) -> Option<DMatrix<f64>>
     Some(step(&bare, &columns)?.covariance)
 }
 
-/// The Wald statistic of a term and its degrees of freedom.
-pub(crate) fn wald(fit: &Fit, covariance: &DMatrix<f64>, term: usize) -> Option<(f64, usize)> {
-    let own: Vec<usize> = (0..fit.slots.len()).filter(|&slot| fit.slots[slot].0 == term).collect();
-    let parameters = fit.terms[term].parameters();
-    // A term whose size shows in no derivative, such as an onset, cannot be tested this way.
-    let own: Vec<usize> = own.into_iter().filter(|&slot| parameters[fit.slots[slot].1].off.is_finite()).collect();
+/// The Wald statistic of terms and its degrees of freedom.
+pub(crate) fn wald(fit: &Fit, covariance: &DMatrix<f64>, terms: &[usize]) -> Option<(f64, usize)> {
+    let parameter = |slot: usize| {
+        let (term, parameter) = fit.slots[slot];
+        (fit.terms[term].values[parameter], &fit.terms[term].parameters()[parameter])
+    };
+    // A parameter that is off at infinity, or only shapes an effect, says nothing of its presence.
+    let says = |slot: &usize| {
+        let (_, parameter) = parameter(*slot);
+        parameter.off.is_finite() && (parameter.off == 0.0 || fit.slots.len() == 1)
+    };
+    let own: Vec<usize> =
+        (0..fit.slots.len()).filter(|&slot| terms.contains(&fit.slots[slot].0)).filter(says).collect();
     if own.is_empty() {
         return None;
     }
     let part = DMatrix::from_fn(own.len(), own.len(), |i, j| covariance[(own[i], own[j])]);
     let value = |slot: usize| {
-        let (term, parameter) = fit.slots[slot];
-        fit.terms[term].values[parameter] - parameters[parameter].off
+        let (value, parameter) = parameter(slot);
+        value - parameter.off
     };
     let values = nalgebra::DVector::from_fn(own.len(), |i, _| value(own[i]));
     Some((values.dot(&part.cholesky()?.solve(&values)), own.len()))
@@ -297,7 +370,7 @@ fn prune(units: &[&Unit<'_>], mut current: Fit) -> Option<Fit> {
         let Some(covariance) = covariance(units, &current) else { return Some(current) };
         let weakest = (0..current.terms.len())
             .filter_map(|term| {
-                let (wald, count) = wald(&current, &covariance, term)?;
+                let (wald, count) = wald(&current, &covariance, &[term])?;
                 Some((upper_tail(wald, count), term))
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
@@ -305,20 +378,9 @@ fn prune(units: &[&Unit<'_>], mut current: Fit) -> Option<Fit> {
             Some((p, term)) if p > PRUNE => {
                 let mut terms = current.terms.clone();
                 terms.remove(term);
-                current = fit(units, terms, &|_| true, None)?;
+                current = fit(units, terms, &|_| true, Effort::FULL)?;
             }
             _ => return Some(current),
         }
     }
-}
-
-/// Candidates of an entry beside a fit.
-pub(crate) fn linearized_beside(units: &[&Unit<'_>], fit: &Fit, (effect, whose): Entry) -> Vec<Candidate> {
-    candidates(effect, whose, units, &fit.terms, &fit.states)
-}
-
-/// Every candidate of the entries beside a fit, scored.
-pub(crate) fn scored_beside(units: &[&Unit<'_>], fit: &Fit, entries: &[Entry]) -> Vec<Scored> {
-    let mut pool = Pool::default();
-    pool.scored(units, entries, fit)
 }

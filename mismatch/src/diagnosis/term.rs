@@ -50,12 +50,14 @@ impl Term {
         self.effect.info().parameters
     }
 
-    /// Whether every value is within what is plausible, or off.
-    #[allow(clippy::float_cmp, reason = "the off value itself")]
-    pub(crate) fn plausible(&self) -> bool {
-        self.values.iter().zip(self.parameters()).all(|(&value, parameter)| {
+    /// Whether no fitted value was stopped by the end of what is plausible: then the effect is not what the
+    /// data ask for. Angles have no end.
+    #[allow(clippy::float_cmp, reason = "the end itself")]
+    pub(crate) fn is_inside(&self) -> bool {
+        let values = self.values.iter().zip(self.parameters()).zip(&self.free);
+        values.filter(|(_, free)| **free).all(|((&value, parameter), _)| {
             let (least, greatest) = parameter.plausible;
-            value == parameter.off || (least..=greatest).contains(&value)
+            value == parameter.off || (value != least && value != greatest)
         })
     }
 

@@ -63,9 +63,12 @@ pub(crate) struct Step {
 }
 
 /// The best step in `columns` (one list per white unit) beside the active parameters, which follow it.
-/// `None` if the columns say nothing that the active parameters do not.
+/// `None` if there are none, or if they say nothing that the active parameters do not.
 pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<Step> {
     let size = columns.first()?.len();
+    if size == 0 {
+        return None;
+    }
     let active = whites.first()?.active.len();
     let own: Vec<Vec<Vec<Option<Vec<f64>>>>> = whites
         .iter()

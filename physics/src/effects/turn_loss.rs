@@ -17,7 +17,7 @@ impl EffectModel for TurnLoss {
         summary: "turn loss",
         stage: Stage::Body,
         bad_data: false,
-        parameters: &[Parameter::smooth("coefficient_s", "s", (-0.2, 0.2), Relevance::Size(0.002))],
+        parameters: &[Parameter::smooth("coefficient_s", "s", (-2.0, 2.0), Relevance::Size(0.002))],
         channels: &[Channel::Encoders, Channel::Truth],
         equation: "dx = -coefficient_s |w| v",
         confounded_with: "wheel_radius_error, lateral_skid",

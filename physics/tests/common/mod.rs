@@ -80,7 +80,7 @@ fn encoders() -> Vec<EncoderSample> {
     let mut angle_rad = [0.0; 2];
     let mut samples = Vec::new();
     for time_s in instants(180, 0.02) {
-        samples.push(EncoderSample { time_s, angle_rad });
+        samples.push(EncoderSample { time_s, angle_rad, steer_rad: surroundings(time_s).steer_rad });
         let (speed, yaw_rate) = script(time_s);
         angle_rad[0] += (speed - 0.15 * yaw_rate) / 0.05 * 0.02;
         angle_rad[1] += (speed + 0.15 * yaw_rate) / 0.05 * 0.02;
@@ -142,6 +142,7 @@ fn body<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
             ends: [first, first + 25],
             start: motion(from_s).pose,
             surroundings: surroundings(from_s),
+            partner_m: (first % 2 == 0).then_some([[0.7, 0.4], [0.8, 0.4], [0.9, 0.5]]),
         };
         // Reference poses between samples, by a different way at each end.
         let [first_s, last_s] = window.stamps_s();

@@ -42,9 +42,11 @@ const GYRO: Channel = Channel { name: "gyro", columns: &["t", "yaw_rate"] };
 const GPS: Channel = Channel { name: "gps", columns: &["t", "x", "y"] };
 const HEADING: Channel = Channel { name: "heading", columns: &["t", "heading"] };
 const RELATIVE: Channel = Channel { name: "relative", columns: &["t", "target_kind", "target_id"] };
+const STEER: Channel = Channel { name: "steer", columns: &["t", "steer_rad"] };
 const TRUTH: Channel = Channel { name: "truth", columns: &["t", "x", "y", "heading"] };
 
-const CHANNELS: [Channel; 9] = [COMMAND, WHEELS, VELOCITY, INCREMENT, GYRO, GPS, HEADING, RELATIVE, TRUTH];
+const CHANNELS: [Channel; 10] =
+    [COMMAND, WHEELS, VELOCITY, INCREMENT, GYRO, GPS, HEADING, RELATIVE, STEER, TRUTH];
 /// A robot has odometry of one kind.
 const ODOMETRY: [Channel; 3] = [WHEELS, VELOCITY, INCREMENT];
 

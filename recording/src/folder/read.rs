@@ -8,7 +8,7 @@ use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use super::manifest::Manifest;
 use super::{
     CHANNELS, COMMAND, Channel, GPS, GYRO, HEADING, INCREMENT, LANDMARK_COLUMNS, LANDMARKS, NOMINAL,
-    ODOMETRY, RELATIVE, TRUTH, VELOCITY, WHEELS, robot_folder, robots_of, sightings,
+    ODOMETRY, RELATIVE, STEER, TRUTH, VELOCITY, WHEELS, robot_folder, robots_of, sightings,
 };
 use crate::error::RecordingError;
 use crate::ingest::{Ingest, Presence, ReadOptions};
@@ -16,7 +16,7 @@ use crate::nominal::read_nominal;
 use crate::open::{entries, recording_name, warn_of_unmapped_targets};
 use crate::report::{Form, IngestReport};
 use crate::table::{Row, Table};
-use crate::types::{Command, Recording, RobotRecording, TruthSample};
+use crate::types::{Command, Recording, RobotRecording, SteerSample, TruthSample};
 
 /// Reads a recording folder.
 ///
@@ -94,6 +94,9 @@ fn read_robot(ingest: &mut Ingest<'_>, robot: RobotId) -> Result<RobotRecording,
     let commands = read_channel(ingest, robot, COMMAND, &Presence::Optional, |row| {
         Ok(Command { time: row.time(0)?, forward_m_s: row.number(1)?, yaw_rate_rad_s: row.number(2)? })
     })?;
+    let steer = read_channel(ingest, robot, STEER, &Presence::Optional, |row| {
+        Ok(SteerSample { time: row.time(0)?, angle_rad: row.number(1)? })
+    })?;
     let truth = read_channel(ingest, robot, TRUTH, &Presence::Optional, |row| {
         Ok(TruthSample { time: row.time(0)?, pose: pose(row)? })
     })?;
@@ -107,6 +110,7 @@ fn read_robot(ingest: &mut Ingest<'_>, robot: RobotId) -> Result<RobotRecording,
         heading: samples(ingest, HEADING, |row| Ok(Reading::Heading { heading_rad: row.number(1)? }))?,
         sightings: read_sightings(ingest, robot)?,
         commands,
+        steer,
         truth,
     })
 }

@@ -10,7 +10,7 @@ use pleiad_estimation::{LandmarkId, Timestamp};
 use super::manifest::{self, Manifest};
 use super::{
     CHANNELS, COMMAND, Channel, GPS, GYRO, HEADING, INCREMENT, LANDMARK_COLUMNS, LANDMARKS, NOMINAL,
-    RELATIVE, TRUTH, VELOCITY, WHEELS, robot_folder, robots_of, sightings,
+    RELATIVE, STEER, TRUTH, VELOCITY, WHEELS, robot_folder, robots_of, sightings,
 };
 use crate::error::RecordingError;
 use crate::nominal::{COMMENT, nominal_text};
@@ -164,6 +164,7 @@ fn render_robot(robot: &RobotRecording) -> Result<Vec<Rendered>, String> {
             _ => None,
         })?,
         relative(&robot.sightings)?,
+        table(STEER, &robot.steer, |steer| Some(vec![steer.angle_rad]))?,
         table(TRUTH, &robot.truth, |truth| {
             Some(vec![truth.pose.x_m(), truth.pose.y_m(), truth.pose.yaw_rad()])
         })?,

@@ -7,8 +7,8 @@ use crate::common::{Folder, read_with};
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
 use pleiad_estimation::{LandmarkId, Pose2, RobotId, Timestamp};
 use pleiad_recording::{
-    Command, Nominal, NominalRobot, Overwrite, ReadOptions, Recording, RobotRecording, TruthSample, open,
-    write_folder,
+    Command, Nominal, NominalRobot, Overwrite, ReadOptions, Recording, RobotRecording, SteerSample,
+    TruthSample, open, write_folder,
 };
 use proptest::collection::{btree_map, btree_set};
 use proptest::prelude::*;
@@ -77,11 +77,14 @@ fn robot() -> impl Strategy<Value = RobotRecording> {
     });
     let truth = channel(pose().boxed())
         .prop_map(|rows| rows.into_iter().map(|(time, pose)| TruthSample { time, pose }).collect::<Vec<_>>());
+    let steer = channel(number().boxed()).prop_map(|rows| {
+        rows.into_iter().map(|(time, angle_rad)| SteerSample { time, angle_rad }).collect::<Vec<_>>()
+    });
     let gyro = samples(number().prop_map(|yaw_rate_rad_s| Reading::Gyro { yaw_rate_rad_s }).boxed());
     let heading = samples(number().prop_map(|heading_rad| Reading::Heading { heading_rad }).boxed());
     let gps = samples(two(|x_m, y_m| Reading::Gps { x_m, y_m }));
-    (odometry, commands, truth, gyro, heading, gps, samples(sighting())).prop_map(
-        |(odometry, commands, truth, gyro, heading, gps, sightings)| RobotRecording {
+    (odometry, commands, truth, gyro, heading, gps, samples(sighting()), steer).prop_map(
+        |(odometry, commands, truth, gyro, heading, gps, sightings, steer)| RobotRecording {
             odometry,
             commands,
             truth,
@@ -89,6 +92,7 @@ fn robot() -> impl Strategy<Value = RobotRecording> {
             heading,
             gps,
             sightings,
+            steer,
         },
     )
 }

@@ -5,8 +5,8 @@
 //! which they say `U = exp((v dt, 0, w dt))` it moves by `U exp(n)`, `n ~ N(0, Q dt)` white from tick to
 //! tick and independent of everything else; odometry reports `U` without error. So a filter that integrates
 //! the reports and adds `Ad_N Q dt Ad_N^T` (N after the step) has the law of this world, but for changes of
-//! speed within a tick, which are a tenth of a sigma at most. Within a tick `n` grows as a Brownian motion,
-//! whose variance is the linear `C(t)` such a filter interpolates.
+//! speed within a tick (`docs/scenario.md`). Within a tick `n` grows as a Brownian motion, whose variance is
+//! the linear `C(t)` such a filter interpolates.
 
 mod connectivity;
 mod drive;
@@ -103,6 +103,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<SimulatedRun, Error> {
             gps: channels.gps(),
             heading: channels.heading(),
             sightings: sighting::sightings(&channels, &tracks, &landmarks),
+            steer: channels.steer(),
             truth: channels.truth(scenario.truth_rate_hz, scenario.truth_sigma_m, scenario.truth_sigma_rad),
             commands: channels.commands(),
         };
@@ -121,8 +122,9 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<SimulatedRun, Error> {
 
 /// Brings every channel into the order of its stamps, which a clock that is set back loses.
 fn sort(recorded: &mut RobotRecording) {
-    let RobotRecording { commands, odometry, gyro, gps, heading, sightings, truth: _ } = recorded;
+    let RobotRecording { commands, odometry, gyro, gps, heading, sightings, steer, truth: _ } = recorded;
     commands.sort_by_key(|command| command.time);
+    steer.sort_by_key(|steer| steer.time);
     for channel in [odometry, gyro, gps, heading, sightings] {
         channel.sort_by_key(|sample| sample.time);
     }

@@ -8,14 +8,14 @@ use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_physics::chain::sensors;
 use pleiad_physics::{Context, RobotModel};
-use pleiad_recording::{Command, TruthSample};
+use pleiad_recording::{Command, SteerSample, TruthSample};
 
 use super::OBSERVATIONS_FROM_S;
 use super::drive::Drive;
 use super::model::{Firmware, true_model};
 use super::random::{Channel, Seed, chance, normal};
 use super::track::{Track, wrapped};
-use crate::scenario::{OdometryKind, RobotSettings};
+use crate::scenario::{DriveKind, OdometryKind, RobotSettings};
 
 /// The channels of one robot, to be sampled from its true path.
 pub(super) struct Channels<'a> {
@@ -82,7 +82,8 @@ impl<'a> Channels<'a> {
             .collect();
         let moved = |tick: usize| {
             let turned = [0, 1].map(|wheel| angles[tick + 1][wheel] - angles[tick][wheel]);
-            firmware.moved(turned, self.drive.steer_rad[tick + 1])
+            let [before, after] = [tick, tick + 1].map(|tick| self.drive.steer_rad[tick]);
+            firmware.moved(turned, f64::midpoint(before, after))
         };
         let reading = |tick: usize| match self.settings.odometry.kind {
             OdometryKind::Wheels => {
@@ -115,6 +116,18 @@ impl<'a> Channels<'a> {
         let mut context = self.context(time);
         context.motion.wheel_angle_rad = angles;
         sensors::encoders(&self.model, &context)
+    }
+
+    /// Steering angles of a car at every tick, as its servo holds them; none of any other robot.
+    pub(super) fn steer(&self) -> Vec<SteerSample> {
+        if self.settings.drive.kind != DriveKind::CarLike {
+            return Vec::new();
+        }
+        let sample = |(time, angle_rad): (Timestamp, &f64)| SteerSample {
+            time: self.stamp(time),
+            angle_rad: *angle_rad,
+        };
+        self.track().ticks().zip(&self.drive.steer_rad).map(sample).collect()
     }
 
     /// Yaw rate of the body, the mean over one sampling period centred on the instant. The gyro turns with

@@ -82,11 +82,18 @@ pub(super) fn sightings(
             .collect();
         let targets: Vec<signal::Target> = in_view.iter().map(|seen| seen.target).collect();
         let time = channels.stamp(time);
+        let mut named = Vec::with_capacity(targets.len());
         for InView { target, relative, chance } in in_view {
             let others: Vec<signal::Target> =
                 targets.iter().copied().filter(|other| alike(*other, target)).collect();
             let context = Context { chance, ..context };
-            let target = match sensors::identity(&channels.model, &context, target, &others) {
+            let name = sensors::identity(&channels.model, &context, target, &others);
+            // A sensor that gives a name twice in a scan keeps the first: no recording has both.
+            if named.contains(&name) {
+                continue;
+            }
+            named.push(name);
+            let target = match name {
                 signal::Target::Robot(robot) => Target::Robot(RobotId(robot)),
                 signal::Target::Landmark(landmark) => Target::Landmark(LandmarkId(landmark)),
             };

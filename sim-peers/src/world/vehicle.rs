@@ -27,7 +27,7 @@ const KNOT_HZ: f64 = 200.0;
 const LONGEST_STEP_S: f64 = 0.002;
 /// A speed below which a robot told to stop stands still, m/s and rad/s: friction, which no servo
 /// that is linear has.
-const STANDSTILL: f64 = 1e-4;
+const STANDSTILL: f64 = 1e-6;
 
 /// A robot as others see it: where it was at its last tick, and how fast.
 #[derive(Clone, Copy, Debug)]

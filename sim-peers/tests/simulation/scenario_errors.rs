@@ -83,6 +83,56 @@ fn a_value_out_of_range_is_shown_at_the_line_that_set_it() {
 }
 
 #[test]
+fn an_effect_that_the_catalogue_does_not_have_is_named_with_its_line() {
+    check(
+        "[[defaults.effects]]\nname = \"gyro_bais\"\nparameters = { bias_rad_s = 0.1 }\n",
+        "bad.toml:5: `defaults.effects[0].name`: found \"gyro_bais\", expected an effect of the catalogue, perhaps \"gyro_bias\"",
+    );
+    check(
+        "[[robots]]\nid = 1\n[[robots.effects]]\nname = \"gyro_bias\"\nparameters = { bias = 0.1 }\n",
+        "bad.toml:8: `robots[0].effects[0].parameters.bias`: found this parameter, expected a value for a parameter of `gyro_bias`, which has: bias_rad_s",
+    );
+    check(
+        "[[defaults.effects]]\nname = \"crab\"\nparameters = { rad = 0.1 }\nwithin = { time_s = [5.0, 2.0] }\n",
+        "bad.toml:7: `defaults.effects[0].within.time_s`: found `[5.0, 2.0]`, expected [from, to] with from < to",
+    );
+    check(
+        "[[defaults.effects]]\nname = \"crab\"\nparameter = { rad = 0.1 }\n",
+        "bad.toml:6: unknown key `defaults.effects[0].parameter`; the nearest known key is `parameters` (all keys: docs/scenario.md)",
+    );
+}
+
+#[test]
+fn a_mistuned_value_that_no_nominal_model_can_have_is_refused() {
+    check(
+        "[[robots]]\nid = 1\ndeclared = { wheel_radius = 0.0 }\n",
+        "bad.toml:6: `robots[0].declared.wheel_radius` is 0; expected a finite number above 0",
+    );
+    check(
+        "[[robots]]\nid = 1\ndeclared = { wheel_base = 0.3 }\n",
+        "bad.toml:6: unknown key `robots[0].declared.wheel_base`; the nearest known key is `wheel_radius` (all keys: docs/scenario.md)",
+    );
+    check(
+        "[defaults.motion]\npolicy = \"script\"\nscript = [[0.5, 0.0, 0.0]]\n",
+        "bad.toml:6: `defaults.motion.script` is [0.5, 0.0, 0.0]; expected finite numbers [forward m/s, yaw rate rad/s, seconds] with seconds above 0",
+    );
+}
+
+#[test]
+fn effects_of_the_defaults_come_before_those_of_the_robot() {
+    let scenario = scenario(&format!(
+        "{HEAD}[[defaults.effects]]\nname = \"crab\"\nparameters = {{ rad = 0.1 }}\n\
+         [[robots]]\nid = 2\n[[robots.effects]]\nname = \"gps_lever_arm\"\nparameters = {{ offset_body_m = [0.2, -0.1] }}\n"
+    ));
+    let names = |id| {
+        let effects = &scenario.robots[&RobotId(id)].effects;
+        effects.iter().map(|own| (own.effect().name(), own.values().to_vec())).collect::<Vec<_>>()
+    };
+    assert_eq!(names(1), [("crab", vec![0.1])]);
+    assert_eq!(names(2), [("crab", vec![0.1]), ("gps_lever_arm", vec![0.2, -0.1])]);
+}
+
+#[test]
 fn robots_must_be_numbered_from_one_and_listed_once() {
     check("[[robots]]\nid = 0\n", "bad.toml:5: `robots[0].id` is 0; expected a whole number from 1");
     check(

@@ -65,10 +65,12 @@ impl Manoeuvres {
         let motion = &settings.motion;
         let [x_min, x_max, y_min, y_max] = own_area(scenario, robot);
         let smaller_m = (x_max - x_min).min(y_max - y_min);
-        let margin_m = (MARGIN_SHARE * smaller_m).min(MARGIN_M);
         let drive = &settings.drive;
         let tightest_m =
             (drive.kind == DriveKind::CarLike).then(|| drive.wheelbase_m / drive.max_steer_rad.tan());
+        // A car that is called back turns round first.
+        let turning_m = tightest_m.map_or(0.0, |radius_m| (2.0 * radius_m).min(0.25 * smaller_m));
+        let margin_m = (MARGIN_SHARE * smaller_m).min(MARGIN_M) + turning_m;
         let limits = Limits {
             speed_m_s: motion.speed_m_s,
             yaw_rate_rad_s: motion.max_yaw_rate_rad_s,
@@ -100,14 +102,11 @@ impl Manoeuvres {
 
     fn choose(&mut self, view: &View<'_>) {
         if self.deck.is_empty() {
-            self.deck = programme(&self.limits);
-            // Fisher and Yates.
-            for last in (1..self.deck.len()).rev() {
-                let other = ((last + 1) as f64 * uniform(&mut self.stream)).floor();
-                // The draw is below `last + 1`.
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-                self.deck.swap(last, other as usize);
-            }
+            let [first, rest] = programme(&self.limits);
+            // Taken from the end.
+            self.deck = self.shuffled(rest);
+            let first = self.shuffled(first);
+            self.deck.extend(first);
         }
         let Some(next) = self.deck.pop() else { return };
         let heading_rad = between(&mut self.stream, -PI, PI);
@@ -122,6 +121,17 @@ impl Manoeuvres {
         };
         let give_up_s = view.time_s + PATIENCE_S;
         self.phase = Phase::Approaching { next, to, heading_rad, give_up_s, arrived: false };
+    }
+
+    /// By Fisher and Yates.
+    fn shuffled(&mut self, mut manoeuvres: Vec<Manoeuvre>) -> Vec<Manoeuvre> {
+        for last in (1..manoeuvres.len()).rev() {
+            let other = ((last + 1) as f64 * uniform(&mut self.stream)).floor();
+            // The draw is below `last + 1`.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            manoeuvres.swap(last, other as usize);
+        }
+        manoeuvres
     }
 
     /// The command on the way to the start; none when it is reached.

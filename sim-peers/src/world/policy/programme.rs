@@ -27,38 +27,41 @@ const PAUSE: [f64; 3] = [0.0, 0.0, PAUSE_S];
 const CRAWL_M_S: f64 = 0.06;
 const CRAWL_RAD_S: f64 = 0.1;
 
-/// Every manoeuvre once.
-pub(super) fn programme(limits: &Limits) -> Vec<Manoeuvre> {
+/// Every manoeuvre once: first those that every kind of motion is in, then the rest.
+pub(super) fn programme(limits: &Limits) -> [Vec<Manoeuvre>; 2] {
     let Limits { speed_m_s: fast, yaw_rate_rad_s: turn, reach_m, .. } = *limits;
     let (slow, middle) = (0.3 * fast, 0.6 * fast);
-    let mut all = vec![
-        vec![[0.0, 0.0, 6.0]],
-        there_and_back(slow, 0.0, 0.8 * reach_m / slow),
+    let mut first = vec![
+        vec![[0.0, 0.0, 5.0]],
+        there_and_back(slow, 0.0, 0.6 * reach_m / slow),
         there_and_back(middle, 0.0, 1.6 * reach_m / middle),
         there_and_back(fast, 0.0, 1.6 * reach_m / fast),
         stop_and_go(fast, reach_m),
+        crawl(limits),
+        eight(limits, fast),
+        square(limits, middle, 1.0),
+    ];
+    let mut rest = vec![
         stop_and_go(-middle, reach_m),
         ramp(fast, reach_m),
-        crawl(limits),
         weave(middle, turn, reach_m),
         eight(limits, middle),
-        eight(limits, fast),
         eight(limits, -middle),
+        square(limits, middle, -1.0),
     ];
     for sense in [1.0, -1.0] {
-        all.push(arc(limits, middle, sense, 0.5 * reach_m));
-        all.push(arc(limits, fast, sense, 0.9 * reach_m));
-        all.push(square(limits, middle, sense));
+        first.push(arc(limits, middle, sense, 0.5 * reach_m));
+        rest.push(arc(limits, fast, sense, 0.9 * reach_m));
         if limits.tightest_m.is_none() {
-            all.push(vec![[0.0, sense * turn, TAU / turn], PAUSE]);
-            all.push(vec![[0.0, sense * 0.4 * turn, PI / (0.4 * turn)], PAUSE]);
-            all.push(turn_steps(sense * turn));
-            all.push(vec![[fast, sense * turn, TAU / turn], PAUSE]);
+            first.push(vec![[0.0, sense * turn, TAU / turn], PAUSE]);
+            first.push(vec![[0.0, sense * 0.4 * turn, PI / (0.4 * turn)], PAUSE]);
+            rest.push(turn_steps(sense * turn));
+            rest.push(vec![[fast, sense * turn, TAU / turn], PAUSE]);
         } else {
-            all.push(there_and_back(slow, sense * slow / limits.radius(0.0), 0.7 * reach_m / slow));
+            rest.push(there_and_back(slow, sense * slow / limits.radius(0.0), 0.7 * reach_m / slow));
         }
     }
-    all
+    [first, rest]
 }
 
 impl Limits {
@@ -109,10 +112,10 @@ fn ramp(speed: f64, reach_m: f64) -> Manoeuvre {
 }
 
 fn crawl(limits: &Limits) -> Manoeuvre {
-    let mut rows = there_and_back(CRAWL_M_S, 0.0, 5.0);
-    rows.extend(there_and_back(0.3 * CRAWL_M_S, 0.0, 3.0));
+    let mut rows = there_and_back(CRAWL_M_S, 0.0, 3.0);
+    rows.extend(there_and_back(0.3 * CRAWL_M_S, 0.0, 2.0));
     if limits.tightest_m.is_none() {
-        rows.extend(there_and_back(0.0, CRAWL_RAD_S, 5.0));
+        rows.extend(there_and_back(0.0, CRAWL_RAD_S, 3.0));
     }
     rows
 }
@@ -149,7 +152,7 @@ fn square(limits: &Limits, speed: f64, sense: f64) -> Manoeuvre {
         vec![[speed, sense * yaw_rate, FRAC_PI_2 / yaw_rate]]
     };
     let rounded_m = limits.tightest_m.map_or(0.0, |_| 2.0 * limits.radius(0.0));
-    let side_m = (1.4 * limits.reach_m - rounded_m).max(0.1);
+    let side_m = (1.2 * limits.reach_m - rounded_m).max(0.1);
     let side = std::iter::once([speed, 0.0, side_m / speed]).chain(corner);
     (0..4).flat_map(|_| side.clone()).chain([PAUSE]).collect()
 }

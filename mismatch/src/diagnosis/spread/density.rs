@@ -1,0 +1,81 @@
+//! Log-densities.
+
+use crate::diagnosis::noise;
+
+/// Half the logarithm of two pi.
+const HALF_LOG_TAU: f64 = 0.918_938_533_204_672_7;
+/// Below this, the reciprocal of the degrees of freedom makes Student's t a Gaussian.
+const GAUSSIAN: f64 = 1e-9;
+
+/// Of a Gaussian error of `z` sigmas.
+pub(super) fn gaussian(z: f64, sigma: f64) -> f64 {
+    -0.5 * z * z - libm::log(sigma) - HALF_LOG_TAU
+}
+
+/// The same, its slope bounded beyond [`noise::CLIP`] sigmas.
+pub(super) fn bounded(z: f64, sigma: f64) -> f64 {
+    -0.5 * noise::rho(z) - libm::log(sigma) - HALF_LOG_TAU
+}
+
+/// Student's t of one over `reciprocal` degrees of freedom.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Student {
+    reciprocal: f64,
+    constant: f64,
+}
+
+impl Student {
+    pub(super) fn new(reciprocal: f64) -> Self {
+        let constant = if reciprocal < 0.02 {
+            // Of lgamma((n+1)/2) - lgamma(n/2) - log(n/2)/2 for large n.
+            -0.25 * reciprocal + reciprocal.powi(3) / 24.0
+        } else {
+            let freedom = 1.0 / reciprocal;
+            libm::lgamma(0.5 * (freedom + 1.0)) - libm::lgamma(0.5 * freedom) - 0.5 * libm::log(0.5 * freedom)
+        };
+        Self { reciprocal, constant }
+    }
+
+    /// Of an error of `z` scales.
+    pub(super) fn log_density(self, z: f64, scale: f64) -> f64 {
+        if self.reciprocal < GAUSSIAN {
+            return gaussian(z, scale);
+        }
+        let tail = 0.5 * (1.0 / self.reciprocal + 1.0) * libm::log1p(self.reciprocal * z * z);
+        self.constant - tail - libm::log(scale) - HALF_LOG_TAU
+    }
+}
+
+/// The logarithm of the sum of two numbers given by theirs.
+pub(super) fn log_sum(a: f64, b: f64) -> f64 {
+    let (high, low) = if a > b { (a, b) } else { (b, a) };
+    if high == f64::NEG_INFINITY { high } else { high + libm::log1p(libm::exp(low - high)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use statrs::distribution::{Continuous, StudentsT};
+
+    use super::*;
+
+    #[test]
+    fn student_is_that_of_a_library_and_ends_at_the_gaussian() {
+        for freedom in [1.0, 3.0, 49.0, 51.0, 1000.0] {
+            let own = Student::new(1.0 / freedom);
+            let library = StudentsT::new(0.0, 0.3, freedom).unwrap();
+            for error in [0.0, 0.2, -1.7, 40.0] {
+                let found = own.log_density(error / 0.3, 0.3);
+                assert!((found - library.ln_pdf(error)).abs() < 1e-8, "{freedom} {error} {found}");
+            }
+        }
+        let near = Student::new(1e-8).log_density(2.0, 0.5) - gaussian(2.0, 0.5);
+        assert!(near.abs() < 1e-6 && Student::new(0.0).log_density(2.0, 0.5) == gaussian(2.0, 0.5));
+    }
+
+    #[test]
+    fn sums_of_logarithms_do_not_overflow() {
+        assert!((log_sum(-1000.0, -1000.0) - (-1000.0 + 2.0_f64.ln())).abs() < 1e-12);
+        assert_eq!(log_sum(3.0, f64::NEG_INFINITY), 3.0);
+        assert_eq!(log_sum(f64::NEG_INFINITY, f64::NEG_INFINITY), f64::NEG_INFINITY);
+    }
+}

@@ -1,0 +1,139 @@
+//! From what a likelihood shows to what may be said of it.
+
+use pleiad_estimation::RobotId;
+use pleiad_physics::Effect;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use crate::diagnosis::naming::{Estimated, GAIN_ERRORS, Judged, NEAR_END};
+use crate::diagnosis::power::POWER_80;
+use crate::diagnosis::select::FAMILYWISE;
+use crate::diagnosis::spread::SpreadTerm;
+use crate::diagnosis::spread::family::{Family, Member, Shown, Shows};
+use crate::diagnosis::spread::maximum::{Optimum, Uncertainty};
+use crate::diagnosis::term::{Term, Whose};
+use crate::findings::{Place, Undetected, Verdict};
+
+/// Judges what a family of one robot shows, among so many tests.
+pub(super) fn judged(family: &Family<'_, '_>, shows: &Shows, robot: RobotId, tests: usize) -> SpreadTerm {
+    let member = &family.members[shows.member];
+    let parameters = &shows.with.parameters;
+    let values = member.shown.iter().map(|shown| shown.value(parameters)).collect();
+    let errors = member.shown.iter().map(|shown| shown.error(parameters, &shows.known)).collect();
+    let mut term = Term::new(member.effect, Whose::Robot(robot), values);
+    for (free, shown) in term.free.iter_mut().zip(&member.shown) {
+        *free = !matches!(shown, Shown::Fixed(_));
+    }
+    let estimated = Estimated { term, errors };
+    let relevant = is_relevant(family, member, &estimated, &shows.with, &shows.known);
+    let mut support = vec![member.effect];
+    support.extend(&shows.rivals);
+    let p_familywise = (shows.p * tests as f64).min(1.0);
+    let useful = shows.gain.total > GAIN_ERRORS * shows.gain.standard_error;
+    let verdict =
+        (p_familywise < FAMILYWISE && relevant && useful).then(|| verdict(member.effect, support.len()));
+    let judged = Judged {
+        estimated: vec![estimated],
+        total: None,
+        verdict,
+        p_familywise,
+        channel: shows.channel,
+        place: Place::default(),
+        one_off: false,
+    };
+    SpreadTerm { judged, gain: shows.gain, robots: vec![robot], support }
+}
+
+/// The verdict of a named effect with so many that explain it.
+pub(super) fn verdict(effect: Effect, members: usize) -> Verdict {
+    if members > 1 {
+        Verdict::CannotTell
+    } else if effect.info().bad_data {
+        Verdict::BadData
+    } else {
+        Verdict::Named
+    }
+}
+
+fn is_relevant(
+    family: &Family<'_, '_>,
+    member: &Member,
+    estimated: &Estimated,
+    with: &Optimum,
+    known: &Uncertainty,
+) -> bool {
+    let contrast = member.contrasts.iter().any(|contrast| {
+        let beyond = |(size, error): (f64, f64)| size - NEAR_END * error > contrast.threshold;
+        contrast.estimate(&with.parameters, known).is_some_and(beyond)
+    });
+    // What is told from a declared value alone is not what was tested.
+    let tested = |shown: &Shown| !matches!(shown, Shown::ExpLess(..) | Shown::Fixed(_));
+    contrast
+        || family.units.iter().any(|unit| {
+            let parameters = estimated.term.parameters().iter().enumerate();
+            parameters.filter(|(index, _)| tested(&member.shown[*index])).any(|(index, parameter)| {
+                let threshold = parameter.relevance.threshold(&unit.floors);
+                let size = (estimated.term.values[index] - parameter.off).abs();
+                let near = |error: f64| threshold > 0.0 && size - NEAR_END * error > threshold;
+                estimated.errors[index].is_some_and(near)
+            })
+        })
+}
+
+/// The smallest sizes of a family's effects that would have been found in four of five recordings.
+pub(super) fn undetected(
+    family: &Family<'_, '_>,
+    base: &Optimum,
+    found: &[Effect],
+    robot: RobotId,
+    tests: usize,
+) -> Vec<Undetected> {
+    let critical = Normal::standard().inverse_cdf(1.0 - 0.5 * FAMILYWISE / tests.max(1) as f64);
+    let mut all = Vec::new();
+    for (position, member) in family.members.iter().enumerate() {
+        if found.contains(&member.effect) {
+            continue;
+        }
+        let info = member.effect.info();
+        // Where a parameter ends at its bound, nothing is known of its error there: half a step inside.
+        let mut there = base.clone();
+        for (&index, (&off, &start)) in member.parameters.iter().zip(member.off.iter().zip(&member.start)) {
+            there.parameters[index] = if off.is_finite() { off + 1e-3 * (start - off) } else { start };
+        }
+        let known = if member.chances.is_some() { None } else { family.known(&[position], &there) };
+        for (shown, parameter) in member.shown.iter().zip(info.parameters) {
+            let threshold =
+                family.units.iter().map(|unit| parameter.relevance.threshold(&unit.floors)).fold(0.0, f64::max);
+            let error = |index: usize| Some(known.as_ref()?.between(index, index)?.sqrt());
+            let near = NEAR_END + POWER_80;
+            let size = match *shown {
+                Shown::Value(index) => {
+                    error(index).map(|error| ((critical + POWER_80) * error).max(threshold + near * error))
+                }
+                // Of a square known to e the root is known to e/(2 root).
+                Shown::Root(index) => error(index).map(|error| {
+                    let relevant = 0.5 * (threshold + (threshold * threshold + 2.0 * near * error).sqrt());
+                    ((critical + POWER_80) * error).sqrt().max(relevant)
+                }),
+                Shown::Inverse(index) => error(index).map(|error| {
+                    let least = member.contrasts.first().map_or(0.0, |contrast| contrast.threshold);
+                    1.0 / ((critical + POWER_80) * error).max(least + near * error)
+                }),
+                // A count of n p events is known to its root.
+                Shown::Exp(_) => member.chances.map(|count| {
+                    let one = near / (count as f64).sqrt();
+                    (0.5 * (one + (one * one + 4.0 * threshold).sqrt())).powi(2)
+                }),
+                Shown::ExpLess(..) | Shown::Fixed(_) => None,
+            };
+            let Some(minimum_detectable) = size.filter(|size| size.is_finite()) else { continue };
+            all.push(Undetected {
+                effect: info.name.to_owned(),
+                robot: Some(robot.0),
+                parameter: parameter.label(),
+                minimum_detectable,
+                unit: parameter.unit.to_owned(),
+            });
+        }
+    }
+    all
+}

@@ -1,0 +1,244 @@
+//! Ranges and bearings: how wide, with what tails, and under which name.
+//!
+//! Of a sighting that names target A at range `r` and bearing `b`, with the others of its kind in view,
+//!
+//! ```text
+//! density = (1 - p) f(A) + p/n sum over others B of f(B),   f = t((r - r_B)/sigma_r) t((b - b_B)/sigma_b)
+//! sigma_r = a + s1 r + s2 r^2,   sigma_b = c + s |w|
+//! ```
+//!
+//! with `a` and `c` estimated per kind of target, `t` Student's, and `n` the number of other sightings of that
+//! kind at the same instant: an identity is drawn among what was seen.
+
+use pleiad_physics::{Effect, Floors, RobotModel};
+
+use crate::diagnosis::fit::Fit;
+use crate::diagnosis::spread::density::{Student, log_sum};
+use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
+use crate::diagnosis::spread::maximum::{Bounds, Density};
+use crate::diagnosis::spread::scans::{CHANNELS, actual, scans, targets};
+use crate::diagnosis::unit::Unit;
+
+/// Parameters: the logarithms of the least sigma, of range and bearing, to landmarks and to robots.
+const BASE: usize = 0;
+const LINEAR: usize = 4;
+const SQUARE: usize = 5;
+const BLUR: usize = 6;
+const TAILS: usize = 7;
+const MIXED: usize = 8;
+/// The reciprocal of so many degrees of freedom is a tail that matters.
+const LEAST_TAIL: f64 = 1.0 / 30.0;
+/// A reading this many times the spread of its channel from a target cannot be of it.
+const FAR: f64 = 12.0;
+/// A sigma is at least this share of its value at no range and no turn.
+const LEAST_SIGMA: f64 = 0.05;
+
+/// One sighting.
+struct Row {
+    /// 0 landmark, 1 robot.
+    kind: usize,
+    /// Predicted range, metres: what sigma depends on.
+    range_m: f64,
+    yaw_rate_rad_s: f64,
+    /// Measured minus predicted range and bearing of the target that it names.
+    errors: [Option<f64>; 2],
+    /// The same of others that it could be of.
+    others: Vec<[Option<f64>; 2]>,
+    /// How many others were seen at the same instant.
+    choices: usize,
+}
+
+struct Sightings {
+    rows: Vec<Row>,
+    blocks: Vec<usize>,
+}
+
+impl Sightings {
+    fn sigmas(row: &Row, parameters: &[f64]) -> [f64; 2] {
+        let base = [0, 1].map(|part| libm::exp(parameters[BASE + 2 * row.kind + part]));
+        let range = base[0] + row.range_m * (parameters[LINEAR] + row.range_m * parameters[SQUARE]);
+        let bearing = base[1] + parameters[BLUR] * row.yaw_rate_rad_s.abs();
+        [range.max(LEAST_SIGMA * base[0]), bearing.max(LEAST_SIGMA * base[1])]
+    }
+}
+
+impl Density for Sightings {
+    fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn blocks(&self) -> &[usize] {
+        &self.blocks
+    }
+
+    fn fill(&self, parameters: &[f64], into: &mut [f64]) {
+        let student = Student::new(parameters[TAILS]);
+        let mixed = libm::exp(parameters[MIXED]);
+        let (own, other) = (libm::log1p(-mixed), parameters[MIXED]);
+        for (row, value) in self.rows.iter().zip(into) {
+            let sigmas = Self::sigmas(row, parameters);
+            let of = |errors: &[Option<f64>; 2]| -> f64 {
+                let part = |(error, sigma): (&Option<f64>, &f64)| {
+                    error.map_or(0.0, |error| student.log_density(error / sigma, *sigma))
+                };
+                errors.iter().zip(&sigmas).map(part).sum()
+            };
+            *value = of(&row.errors);
+            if row.choices > 0 && mixed > 0.0 {
+                let others = row.others.iter().map(of).fold(f64::NEG_INFINITY, log_sum);
+                *value = log_sum(own + *value, other + others - libm::log(row.choices as f64));
+            }
+        }
+    }
+}
+
+/// The sightings of one robot under a fit of the mean.
+pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family<'u, 'a>> {
+    let mut rows = Vec::new();
+    let mut places = Vec::new();
+    for (position, unit) in units.iter().enumerate() {
+        collect(position, unit, &unit.model(&fit.terms), &mut rows, &mut places);
+    }
+    if rows.is_empty() {
+        return None;
+    }
+    let spread = |kind: usize, part: usize| -> Option<f64> {
+        let own = rows.iter().filter(|row| row.kind == kind);
+        let mut sizes: Vec<f64> = own.filter_map(|row: &Row| row.errors[part].map(f64::abs)).collect();
+        sizes.sort_by(f64::total_cmp);
+        let middle = *sizes.get(sizes.len() / 2)?;
+        (middle > 0.0).then_some(1.4826 * middle)
+    };
+    let spreads = [spread(0, 0), spread(0, 1), spread(1, 0), spread(1, 1)];
+    for row in &mut rows {
+        let near = |errors: &[Option<f64>; 2]| {
+            (0..2).all(|part| {
+                let spread = spreads[2 * row.kind + part].unwrap_or(f64::INFINITY);
+                errors[part].is_none_or(|error| error.abs() < FAR * spread)
+            })
+        };
+        row.others.retain(near);
+    }
+    // A likelihood with a parameter per kind and part that is there; a spread of zero has no logarithm.
+    let known: Vec<usize> = (0..4).filter(|&index| spreads[index].is_some()).collect();
+    let has = |part: usize| known.iter().any(|index| index % 2 == part);
+    let base = |index: usize| spreads[index].unwrap_or(1.0);
+    let around = |value: f64| Bounds { low: value.ln() - 8.0, high: value.ln() + 8.0, scale: 0.1 };
+    let mut bounds: Vec<Bounds> = (0..4).map(|index| around(base(index))).collect();
+    let reach = |effect: Effect, parameter: usize, scale: f64| {
+        let (low, high) = effect.info().parameters[parameter].plausible;
+        Bounds { low, high, scale }
+    };
+    bounds.push(reach(Effect::RangeDependentNoise, 1, 0.003));
+    bounds.push(reach(Effect::RangeDependentNoise, 2, 0.001));
+    bounds.push(reach(Effect::MotionBlur, 0, 0.003));
+    bounds.push(Bounds { low: 0.0, high: 1.0, scale: 0.05 });
+    bounds.push(Bounds { low: NEVER, high: -0.7, scale: 0.3 });
+    let mut start: Vec<f64> = (0..4).map(|index| base(index).ln()).collect();
+    start.extend([0.0, 0.0, 0.0, 0.0, f64::NEG_INFINITY]);
+    let mut members = Vec::new();
+    if has(0) {
+        members.extend(range_noise(units, &rows, &known));
+    }
+    if has(1) {
+        members.push(Member {
+            effect: Effect::MotionBlur,
+            parameters: vec![BLUR],
+            off: vec![0.0],
+            start: vec![0.003],
+            shown: vec![Shown::Value(BLUR)],
+            contrasts: Vec::new(),
+            chances: None,
+        });
+    }
+    members.push(Member {
+        effect: Effect::HeavyTails,
+        parameters: vec![TAILS],
+        off: vec![0.0],
+        start: vec![0.1],
+        shown: vec![Shown::Inverse(TAILS)],
+        contrasts: vec![Contrast { weights: vec![(TAILS, 1.0)], threshold: LEAST_TAIL }],
+        chances: None,
+    });
+    let choosable = rows.iter().filter(|row| row.choices > 0).count();
+    if choosable > 0 {
+        members.push(Member {
+            effect: Effect::IdentityMixUp,
+            parameters: vec![MIXED],
+            off: vec![f64::NEG_INFINITY],
+            start: vec![-4.0],
+            shown: vec![Shown::Exp(MIXED)],
+            contrasts: Vec::new(),
+            chances: Some(choosable),
+        });
+    }
+    let density = Sightings { blocks: blocks(units, &places), rows };
+    let units = units.to_vec();
+    Some(Family { units, places, density: Box::new(density), bounds, start, nuisances: known, members })
+}
+
+/// The logarithm of a probability that is as good as zero.
+const NEVER: f64 = -14.0;
+
+/// The spread of ranges that grows with range. Its constant part is told from the declared spread alone.
+fn range_noise(units: &[&Unit<'_>], rows: &[Row], known: &[usize]) -> Option<Member> {
+    let mut ranges: Vec<f64> =
+        rows.iter().filter(|row| row.errors[0].is_some()).map(|row| row.range_m).collect();
+    ranges.sort_by(f64::total_cmp);
+    let share = |share: usize| ranges.get(ranges.len() * share / 100).copied();
+    let (near, far) = (share(10)?, share(90)?);
+    let often = |kind: usize| rows.iter().filter(|row| row.kind == kind).count();
+    let kind = usize::from(!known.contains(&0) || (known.contains(&2) && often(1) > often(0)));
+    let declared = units.first().map_or(0.0, |unit| unit.nominal.nominal.range_sigma_m);
+    let constant = if declared > 0.0 { Shown::ExpLess(2 * kind, declared) } else { Shown::Fixed(0.0) };
+    let threshold = Effect::RangeDependentNoise.info().parameters[1].relevance;
+    let threshold = threshold.threshold(&Floors::default());
+    // From a near to a far target sigma must grow, or fall, by as much as by the least slope that matters.
+    let contrast = Contrast {
+        weights: vec![(LINEAR, far - near), (SQUARE, far * far - near * near)],
+        threshold: threshold * (far - near),
+    };
+    (far > near).then(|| Member {
+        effect: Effect::RangeDependentNoise,
+        parameters: vec![LINEAR, SQUARE],
+        off: vec![0.0, 0.0],
+        start: vec![1e-3, 1e-4],
+        shown: vec![constant, Shown::Value(LINEAR), Shown::Value(SQUARE)],
+        contrasts: vec![contrast],
+        chances: None,
+    })
+}
+
+/// The sightings of a unit.
+fn collect(
+    position: usize,
+    unit: &Unit<'_>,
+    model: &RobotModel<f64>,
+    rows: &mut Vec<Row>,
+    places: &mut Vec<Place>,
+) {
+    for (kind, channels) in CHANNELS.into_iter().enumerate() {
+        for scan in scans(unit, kind) {
+            let targets = targets(unit, kind, scan.time_s);
+            for own in &scan.readings {
+                let named = actual(model, own);
+                let Some((_, seen)) = targets.iter().find(|(target, _)| *target == named) else { continue };
+                let (errors, range_m) = own.errors(model, seen);
+                if !errors.iter().flatten().all(|error| error.is_finite()) {
+                    continue;
+                }
+                let others = targets.iter().filter(|(target, _)| *target != named);
+                rows.push(Row {
+                    kind,
+                    range_m,
+                    yaw_rate_rad_s: own.sighted.at.motion.yaw_rate_rad_s,
+                    errors,
+                    others: others.map(|(_, seen)| own.errors(model, seen).0).collect(),
+                    choices: scan.readings.len() - 1,
+                });
+                let channel = channels[usize::from(own.measured[0].is_none())];
+                places.push(Place { unit: position, time_s: scan.time_s, channel });
+            }
+        }
+    }
+}
