@@ -14,6 +14,7 @@ use pleiad_mismatch::{DiagnoseOptions, Finding, Findings, Verdict, diagnose};
 use pleiad_physics::{ActiveEffect, Effect, Fit, Parameter};
 use pleiad_recording::Recording;
 use pleiad_sim_peers::{Scenario, simulate};
+use pleiad_tests::program::run;
 
 /// Long enough for about half of the manoeuvres.
 const DURATION_S: f64 = 120.0;
@@ -206,4 +207,41 @@ fn nothing_is_named_in_a_clean_recording() {
         // What was tested is said: it is no verdict of a tool that did not look.
         assert!(findings.undetected.len() > 100, "{scenario}: {}", findings.undetected.len());
     }
+}
+
+#[test]
+fn the_same_recording_gives_the_same_findings() {
+    let planted = [typical(Effect::TrackWidthError, &[1]), typical(Effect::RangeBias, &[2])];
+    let recording = recorded("manoeuvres", &planted);
+    let [one, two] = [recording.clone(), recording].map(|recording| {
+        let diagnosis = diagnose(&[recording], &DiagnoseOptions::default()).unwrap();
+        (serde_json::to_string(&diagnosis.findings).unwrap(), format!("{:?}", diagnosis.corrected))
+    });
+    assert!(one.0.contains("track_width_error") && one.0.contains("range_bias"), "{}", one.0);
+    assert_eq!(one, two);
+}
+
+#[test]
+fn what_was_injected_stands_beside_the_recording_and_nobody_reads_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = "name = \"small\"\nduration_s = 40.0\nteam_size = 1\n\
+                    [defaults]\nmotion = { policy = \"manoeuvres\" }\n\
+                    odometry = { kind = \"wheels\", rate_hz = 50.0 }\ngps = { rate_hz = 4.0, sigma_m = 0.03 }\n\
+                    [[robots]]\nid = 1\n[[robots.effects]]\nname = \"gps_lever_arm\"\n\
+                    parameters = { offset_body_m = [0.22, -0.1] }\n";
+    std::fs::write(folder.path().join("small.toml"), scenario).unwrap();
+    run(folder.path(), ["simulate", "small.toml", "--out", "made", "--seed", "3"]).success();
+    let manifest = folder.path().join("made.injected.toml");
+    let told = std::fs::read_to_string(&manifest).unwrap();
+    assert!(told.contains("gps_lever_arm"), "{told}");
+    let findings = |out: &str| run(folder.path(), ["diagnose", "made", "--json", "--out", out]).json();
+    let with = findings("with");
+    assert_eq!(with["findings"][0]["effect"], "gps_lever_arm", "{with}");
+    // Another claim, what is no claim at all, and none.
+    std::fs::write(&manifest, told.replace("gps_lever_arm", "gps_latency")).unwrap();
+    assert_eq!(findings("other"), with);
+    std::fs::write(&manifest, "][ no TOML").unwrap();
+    assert_eq!(findings("broken"), with);
+    std::fs::remove_file(&manifest).unwrap();
+    assert_eq!(findings("gone"), with);
 }

@@ -144,11 +144,7 @@ pub(crate) fn whites<'u, 'a>(units: &[&'u Unit<'a>], fit: &'u Fit) -> Vec<White<
     each.map(|((unit, state), columns)| White::new(unit, state, columns)).collect()
 }
 
-pub(crate) fn score(
-    units: &[&Unit<'_>],
-    whites: &[White<'_, '_>],
-    candidate: &Candidate,
-) -> Option<Scored> {
+pub(crate) fn score(units: &[&Unit<'_>], whites: &[White<'_, '_>], candidate: &Candidate) -> Option<Scored> {
     let all = candidate.columns(units);
     let own: Vec<&White<'_, '_>> = all.iter().map(|(unit, _)| &whites[*unit]).collect();
     let columns: Vec<&[_]> = all.iter().map(|(_, columns)| columns.as_slice()).collect();
@@ -239,12 +235,7 @@ fn additions(
 
 /// Fits the strongest rivals and gives the best of them, fitted. Where none of these keeps what its
 /// linearization promised (a few wild readings promise much), the next strongest have their turn.
-fn choose(
-    units: &[&Unit<'_>],
-    whites: &[White<'_, '_>],
-    current: &Fit,
-    rivals: &[&Scored],
-) -> Option<Fit> {
+fn choose(units: &[&Unit<'_>], whites: &[White<'_, '_>], current: &Fit, rivals: &[&Scored]) -> Option<Fit> {
     let mut rest = rivals;
     while let Some(first) = rest.first() {
         let close = rest.iter().take_while(|rival| rival.step.gain > LEAST_SHARE * first.step.gain).count();
@@ -321,7 +312,7 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
         terms.iter().map(|term| whose == Whose::Everyone || term.whose == whose).collect();
     let known: Vec<State> = own.iter().map(|&unit| current.states[unit].clone()).collect();
     let states = with_another(&acting, &known, &terms)?;
-    fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL)
+    Some(fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL))
 }
 
 /// What a fit with one more term gains by Bayes' information criterion on the effective sample size; more is

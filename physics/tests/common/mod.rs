@@ -7,8 +7,8 @@ use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::chain::robot::Robot;
 use pleiad_physics::chain::sensors::{self, Seen};
 use pleiad_physics::predict::{
-    Anchor, BodyWindow, CommandWindow, EncoderSample, Instant, Path, body_motion, commanded_truth_change, gps, heading,
-    mean_gyro, sighting, truth, truth_change, wheel_turns,
+    Anchor, BodyWindow, CommandWindow, EncoderSample, Instant, Path, body_motion, commanded_truth_change,
+    gps, heading, mean_gyro, sighting, truth, truth_change, wheel_turns,
 };
 use pleiad_physics::signal::Target;
 use pleiad_physics::{Chance, Context, Drive, Motion, Nominal, Pose, RobotModel, Scalar, Surroundings};
@@ -142,12 +142,17 @@ fn body<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
             ends: [first, first + 25],
             start: motion(from_s).pose,
             surroundings: surroundings(from_s),
+            partner_m: (first % 2 == 0).then_some([[0.7, 0.4], [0.8, 0.4], [0.9, 0.5]]),
         };
         // Reference poses between samples, by a different way at each end.
         let [first_s, last_s] = window.stamps_s();
         let stamps_s = [first_s - 0.007, last_s + 0.004];
         push_pose(out, &format!("body {from_s:.2}"), body_motion(model, &window, &mut states[0]));
-        push_pose(out, &format!("truth change {from_s:.2}"), truth_change(model, &window, stamps_s, &mut states[1]));
+        push_pose(
+            out,
+            &format!("truth change {from_s:.2}"),
+            truth_change(model, &window, stamps_s, &mut states[1]),
+        );
         out.push((format!("gyro {from_s:.2}"), mean_gyro(model, &window, &mut states[2])));
     }
 }

@@ -214,9 +214,9 @@ fn collect(
                 let reached = |since_s| reached(since_s, constants_s[part]);
                 -change.by[part] * (reached(ended_s) - reached(begun_s))
             });
-            for part in 0..2 {
-                row.delayed[part] += delayed[part];
-                row.agitation[part] += delayed[part] * delayed[part];
+            for ((sum, agitation), delayed) in row.delayed.iter_mut().zip(&mut row.agitation).zip(delayed) {
+                *sum += delayed;
+                *agitation += delayed * delayed;
             }
             if let Some(late_s) = change.late_s {
                 row.lost.push([0, 1].map(|part: usize| {
@@ -227,7 +227,11 @@ fn collect(
             }
         }
         rows.push(row);
-        places.push(Place { unit: position, time_s: f64::midpoint(from_s, to_s), channel: Channel::Actuator });
+        places.push(Place {
+            unit: position,
+            time_s: f64::midpoint(from_s, to_s),
+            channel: Channel::Actuator,
+        });
     }
 }
 

@@ -116,8 +116,11 @@ pub(super) fn undetected(
         }
         let known = if member.chances.is_some() { None } else { family.known(&[position], &there) };
         for (shown, parameter) in member.shown.iter().zip(info.parameters) {
-            let threshold =
-                family.units.iter().map(|unit| parameter.relevance.threshold(&unit.floors)).fold(0.0, f64::max);
+            let threshold = family
+                .units
+                .iter()
+                .map(|unit| parameter.relevance.threshold(&unit.floors))
+                .fold(0.0, f64::max);
             let error = |index: usize| Some(known.as_ref()?.between(index, index)?.sqrt());
             let near = NEAR_END + POWER_80;
             let size = match *shown {

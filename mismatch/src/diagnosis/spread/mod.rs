@@ -106,17 +106,44 @@ pub(crate) struct Explained {
     pub(crate) part: Option<f64>,
 }
 
-/// The families of a robot that have effects among the entries.
-type Build = for<'u, 'a> fn(&[&'u Unit<'a>], &Fit) -> Option<Family<'u, 'a>>;
-const FAMILIES: [(&[Effect], Build); 4] = [
-    (
-        &[Effect::RangeDependentNoise, Effect::MotionBlur, Effect::HeavyTails, Effect::IdentityMixUp],
-        sighted::family,
-    ),
-    (&[Effect::MissedDetections], missed::family),
-    (&[Effect::GyroRandomWalk], walk::family),
-    (&[Effect::CommandJitter, Effect::CommandLoss], executed::family),
-];
+/// Effects that are looked for together.
+#[derive(Clone, Copy)]
+enum Group {
+    Sightings,
+    Gyro,
+    Commands,
+}
+
+impl Group {
+    const ALL: [Self; 3] = [Self::Sightings, Self::Gyro, Self::Commands];
+
+    fn effects(self) -> &'static [Effect] {
+        match self {
+            Self::Sightings => &EFFECTS[..5],
+            Self::Gyro => &EFFECTS[5..6],
+            Self::Commands => &EFFECTS[6..8],
+        }
+    }
+
+    fn spread(self, units: &[&Unit<'_>], fit: &Fit, robot: RobotId, tests: usize) -> Spread {
+        let of_family = |family: Option<Family<'_, '_>>| {
+            family.map_or_else(Spread::default, |family| of_family(&family, fit, robot, tests))
+        };
+        match self {
+            Self::Sightings => {
+                let mut all = of_family(sighted::family(units, fit));
+                let mixed = all.terms.iter().map(|own| &own.judged.estimated[0].term);
+                let mixed =
+                    mixed.filter(|term| term.effect == Effect::IdentityMixUp).map(|term| term.values[0]);
+                let displaced = sighted::displaced(units, mixed.sum());
+                all.join(of_family(missed::family(units, fit, displaced)));
+                all
+            }
+            Self::Gyro => of_family(walk::family(units, fit)),
+            Self::Commands => of_family(executed::family(units, fit)),
+        }
+    }
+}
 
 /// Looks for effects of spread among the entries, beside a fit of the mean and among so many tests.
 pub(crate) fn spread(
@@ -129,21 +156,17 @@ pub(crate) fn spread(
     let has = |effect: Effect, robot: RobotId| entries.contains(&(effect, Whose::Robot(robot)));
     let mut jobs = Vec::new();
     for robot in robots(units) {
-        for (effects, build) in FAMILIES {
-            if effects.iter().any(|&effect| has(effect, robot)) {
-                jobs.push((robot, build));
+        for group in Group::ALL {
+            if group.effects().iter().any(|&effect| has(effect, robot)) {
+                jobs.push((robot, group));
             }
         }
     }
-    let parts = parallel::map(&jobs, |&(robot, build)| {
-        let family = build(&of_robot(units, robot), fit);
-        family.map_or_else(Spread::default, |family| of_family(&family, fit, robot, tests))
-    });
+    let parts =
+        parallel::map(&jobs, |&(robot, group)| group.spread(&of_robot(units, robot), fit, robot, tests));
     let mut all = Spread { terms: swaps.terms(tests), ..Spread::default() };
     for part in parts {
-        all.terms.extend(part.terms);
-        all.undetected.extend(part.undetected);
-        all.explained.extend(part.explained);
+        all.join(part);
     }
     for robot in robots(units).into_iter().filter(|&robot| has(Effect::EncoderCoarse, robot)) {
         all.terms.extend(ticks::coarse(&of_robot(units, robot), robot, tests));
@@ -152,11 +175,21 @@ pub(crate) fn spread(
     all
 }
 
+impl Spread {
+    fn join(&mut self, other: Self) {
+        self.terms.extend(other.terms);
+        self.undetected.extend(other.undetected);
+        self.untestable.extend(other.untestable);
+        self.explained.extend(other.explained);
+    }
+}
+
 fn of_family(family: &Family<'_, '_>, fit: &Fit, robot: RobotId, tests: usize) -> Spread {
     let base = family.base();
     let shows = family.select(&base, tests);
     let found: Vec<Effect> = shows.iter().map(|own| family.members[own.member].effect).collect();
-    let mut own = Spread { undetected: judge::undetected(family, &base, &found, robot, tests), ..Spread::default() };
+    let mut own =
+        Spread { undetected: judge::undetected(family, &base, &found, robot, tests), ..Spread::default() };
     for shows in &shows {
         let effect = family.members[shows.member].effect;
         // Effects of the mean that a family knows as rivals are the mean's to name.
