@@ -72,6 +72,12 @@ fn obstacle(effect: Effect, unit: &Unit<'_>) -> Option<String> {
     if info.channels.contains(&Needed::Steer) && !steered {
         return Some("the steering angle was not recorded".to_owned());
     }
+    if effect == Effect::ClockOffset && all_may_be_late(unit) {
+        return Some(
+            "where only commands, sightings and positions were recorded it is the same as all of them late"
+                .to_owned(),
+        );
+    }
     let shows = |channel: &Channel| touches(effect, *channel) && unit.stretch(*channel).is_some();
     if Channel::ALL.iter().any(shows) {
         return None;
@@ -91,6 +97,13 @@ fn obstacle(effect: Effect, unit: &Unit<'_>) -> Option<String> {
         reasons.join("; ")
     };
     Some(missing)
+}
+
+/// Whether everything by the robot's clock has an unknown delay of its own: commands, sightings, positions.
+fn all_may_be_late(unit: &Unit<'_>) -> bool {
+    let prompt = [Channel::Actuator, Channel::Body, Channel::Gyro, Channel::Heading];
+    unit.stretch(Channel::CommandedBody).is_some()
+        && prompt.iter().all(|&channel| unit.stretch(channel).is_none())
 }
 
 /// The effects that an effect is the same as, together: a cause that shows in two elementary ways. The
