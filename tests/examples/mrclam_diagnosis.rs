@@ -1,22 +1,40 @@
-//! Writes the tables of `docs/benchmarks/mrclam-diagnosis.md`.
+//! Writes the figures of `docs/benchmarks/mrclam-diagnosis.md`:
+//! `cargo run -p pleiad-tests --example mrclam_diagnosis -- differences|controls|directions`.
 
-use std::io::Write as _;
+use std::io::{self, Write as _};
 
-use pleiad_tests::mrclam::{CHANGES, differences, recording};
+use pleiad_estimation::RobotId;
+use pleiad_mismatch::{DiagnoseOptions, Finding, Findings, diagnose, models};
+use pleiad_recording::Recording;
+use pleiad_tests::changed::{commands_permuted, commands_reversed};
+use pleiad_tests::mrclam::{
+    CHANGES, Direction, Of, corrected, differences, directions, fitted_and_tested, mean_of, recording, refitted,
+};
 
-fn main() -> std::io::Result<()> {
-    let mut out = std::io::stdout();
+fn main() -> io::Result<()> {
+    for part in std::env::args().skip(1) {
+        match part.as_str() {
+            "differences" => print_differences()?,
+            "controls" => print_controls()?,
+            "directions" => print_directions()?,
+            other => writeln!(io::stderr(), "{other}: expected differences, controls or directions")?,
+        }
+    }
+    Ok(())
+}
+
+fn print_differences() -> io::Result<()> {
+    let mut out = io::stdout();
     let recording = recording(6);
     for change in CHANGES {
         for own in differences(&recording, change) {
             writeln!(
                 out,
-                "{} r{} {} {:.5} -> {:.5} diff {:.5} injected {:.5} half {:.5}",
+                "| {} | {} | {} | {:+.4} | {:+.4} | {:+.4} | {:.4} |",
                 own.change,
                 own.robot,
                 own.parameter,
                 own.unchanged,
-                own.changed,
                 own.found(),
                 own.injected,
                 own.half_width
@@ -24,4 +42,82 @@ fn main() -> std::io::Result<()> {
         }
     }
     Ok(())
+}
+
+fn print_controls() -> io::Result<()> {
+    let recording = recording(6);
+    let controls = [
+        ("unchanged", recording.clone()),
+        ("permuted", commands_permuted(recording.clone(), 20.0, 1)),
+        ("reversed", commands_reversed(recording)),
+    ];
+    for (name, recording) in controls {
+        writeln!(io::stdout(), "{name}")?;
+        let found = diagnose(&[recording], &DiagnoseOptions::default()).map_err(io::Error::other)?;
+        print_findings(&found.findings)?;
+    }
+    Ok(())
+}
+
+fn print_directions() -> io::Result<()> {
+    let mut out = io::stdout();
+    let recordings = [6, 2].map(recording);
+    let mut all: Vec<Direction> = Vec::new();
+    for [fit_on, test_on] in [[0, 1], [1, 0]] {
+        let (fit_on, test_on): (&Recording, &Recording) = (&recordings[fit_on], &recordings[test_on]);
+        writeln!(out, "fitted on {}", fit_on.name)?;
+        let diagnosis = fitted_and_tested(fit_on, test_on);
+        print_findings(&diagnosis.findings)?;
+        let refitted = refitted(fit_on, test_on);
+        let nominal = models(test_on).map_err(io::Error::other)?;
+        let corrected = corrected(&diagnosis, test_on);
+        for own in directions(test_on, &refitted, &corrected, 5.0) {
+            let RobotId(robot) = own.robot;
+            writeln!(
+                out,
+                "| {robot} | {} | heading {:.4} -> {:.4} | position {:.4} -> {:.4} |",
+                test_on.name,
+                rms(own.heading.iter().map(|pair| pair.before)),
+                rms(own.heading.iter().map(|pair| pair.after)),
+                rms(own.position.iter().map(|pair| pair.before)),
+                rms(own.position.iter().map(|pair| pair.after)),
+            )?;
+            all.push(own);
+        }
+        for own in directions(test_on, &nominal, &corrected, 5.0) {
+            writeln!(out, "  nominal heading {:.4} position {:.4}", rms(own.heading.iter().map(|pair| pair.before)), rms(own.position.iter().map(|pair| pair.before)))?;
+        }
+    }
+    for (name, of) in [("heading", Of::Heading), ("position", Of::Position)] {
+        let found = mean_of(&all, of);
+        writeln!(out, "{name}: {:.4} [{:.4}, {:.4}]", found.mean, found.ci95[0], found.ci95[1])?;
+    }
+    Ok(())
+}
+
+fn print_findings(findings: &Findings) -> io::Result<()> {
+    let mut out = io::stdout();
+    for own in &findings.findings {
+        let Finding { verdict, robots, effect, support_set, held_out, .. } = own;
+        let (gain, error) = (held_out.log_score_gain, held_out.log_score_gain_se);
+        writeln!(
+            out,
+            "  {verdict:?} {robots:?} {} {support_set:?} p {:.1e} gain {gain:.1} +- {error:.1}",
+            effect.as_deref().unwrap_or("-"),
+            own.p_familywise
+        )?;
+        for (label, estimate) in &own.parameters {
+            let [low, high] = estimate.ci95;
+            writeln!(out, "      {label} {:+.4} [{low:+.4}, {high:+.4}] {}", estimate.value, estimate.unit)?;
+        }
+    }
+    for note in &findings.notes {
+        writeln!(out, "  note: {note}")?;
+    }
+    Ok(())
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
+    (sum / count).sqrt()
 }

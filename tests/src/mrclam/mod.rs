@@ -20,7 +20,7 @@ use pleiad_mismatch::{
 use pleiad_physics::{ActiveEffect, Effect, RobotModel};
 use pleiad_recording::{ReadOptions, Recording};
 
-use crate::bootstrap::Pair;
+use crate::bootstrap::{Pair, Reduction, mean_reduction};
 pub use differences::{CHANGES, Change, Difference, differences};
 
 /// What anyone would refit first: the scales of forward motion and of turns.
@@ -73,6 +73,13 @@ pub fn refitted(fit_on: &Recording, test_on: &Recording) -> BTreeMap<RobotId, Ro
     models
 }
 
+/// The models that a diagnosis gives to a recording.
+pub fn corrected(diagnosis: &Diagnosis, recording: &Recording) -> BTreeMap<RobotId, RobotModel<f64>> {
+    let nominal = &diagnosis.corrected[&recording.name];
+    let model = |&robot: &RobotId| (robot, nominal.model(robot).expect("a model of every robot"));
+    recording.robots.keys().map(model).collect()
+}
+
 /// What a robot's predictions are worth on a recording that neither model was fitted on.
 pub struct Direction {
     /// Which robot.
@@ -81,6 +88,32 @@ pub struct Direction {
     pub heading: Vec<Pair>,
     /// Errors of position, metres.
     pub position: Vec<Pair>,
+}
+
+/// Blocks of the bootstrap, seconds: longer than any stretch of driving in one way.
+pub const BLOCK_S: f64 = 60.0;
+/// How often blocks are drawn.
+pub const RESAMPLES: usize = 2000;
+/// From which seed.
+pub const SEED: u64 = 1;
+
+/// Which error.
+#[derive(Clone, Copy, Debug)]
+pub enum Of {
+    /// Of heading.
+    Heading,
+    /// Of position.
+    Position,
+}
+
+/// The mean over robots and directions of the share by which the root mean square error falls.
+pub fn mean_of(directions: &[Direction], of: Of) -> Reduction {
+    let pairs = |own: &Direction| match of {
+        Of::Heading => own.heading.clone(),
+        Of::Position => own.position.clone(),
+    };
+    let groups: Vec<Vec<Pair>> = directions.iter().map(pairs).collect();
+    mean_reduction(&groups, BLOCK_S, RESAMPLES, SEED)
 }
 
 /// Compares predictions over `horizon_s` by two models of every robot.

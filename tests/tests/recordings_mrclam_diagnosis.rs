@@ -1,0 +1,97 @@
+//! The diagnosis of real robots (MRCLAM, Leung et al. 2011), whose commands were recorded and whose wheels were
+//! not. `PLEIAD_RECORDINGS` names the folder that holds `mrclam/`;
+//! `cargo test -p pleiad-tests --features recordings --test recordings_mrclam_diagnosis`.
+//!
+//! Figures are in `docs/benchmarks/mrclam-diagnosis.md`.
+
+#![cfg(feature = "recordings")]
+#![allow(clippy::expect_used, reason = "helpers of tests fail by panicking")]
+
+use std::sync::OnceLock;
+
+use pleiad_estimation::RobotId;
+use pleiad_mismatch::{Diagnosis, Estimate, Finding};
+use pleiad_recording::Recording;
+use pleiad_tests::mrclam::{
+    CHANGES, Direction, Of, corrected, differences, directions, fitted_and_tested, mean_of, recording, refitted,
+};
+
+/// Dataset 6 and dataset 2.
+fn recordings() -> &'static [Recording; 2] {
+    static RECORDINGS: OnceLock<[Recording; 2]> = OnceLock::new();
+    RECORDINGS.get_or_init(|| [6, 2].map(recording))
+}
+
+/// Fitted on 6 and tested on 2, and the other way round.
+fn diagnoses() -> &'static [Diagnosis; 2] {
+    static DIAGNOSES: OnceLock<[Diagnosis; 2]> = OnceLock::new();
+    DIAGNOSES.get_or_init(|| {
+        let [six, two] = recordings();
+        [fitted_and_tested(six, two), fitted_and_tested(two, six)]
+    })
+}
+
+/// The finding of a robot that holds a parameter.
+fn found<'a>(diagnosis: &'a Diagnosis, robot: RobotId, parameter: &str) -> Option<(&'a Finding, &'a Estimate)> {
+    let own = diagnosis.findings.findings.iter().filter(|finding| finding.robots == [robot.0]);
+    own.filter_map(|finding| Some((finding, finding.parameters.get(parameter)?))).next()
+}
+
+fn half_width(estimate: &Estimate) -> f64 {
+    0.5 * (estimate.ci95[1] - estimate.ci95[0])
+}
+
+#[test]
+fn a_known_change_is_found_as_the_difference_that_it_makes() {
+    let [six, _] = recordings();
+    for own in CHANGES.iter().flat_map(|change| differences(six, change)) {
+        let missed = (own.found() - own.injected).abs();
+        assert!(
+            missed < own.half_width,
+            "{}, robot {}, {}: {:+.5} instead of {:+.5}, interval +-{:.5}",
+            own.change,
+            own.robot,
+            own.parameter,
+            own.found(),
+            own.injected,
+            own.half_width
+        );
+    }
+}
+
+#[test]
+fn lag_and_delay_are_one_set_whose_total_agrees_between_the_datasets() {
+    let [six, two] = diagnoses();
+    let (mut on_six, mut on_two) = (0, 0);
+    for robot in (1..=5).map(RobotId) {
+        let totals = [six, two].map(|diagnosis| found(diagnosis, robot, "total_s"));
+        for (count, total) in [&mut on_six, &mut on_two].into_iter().zip(&totals) {
+            let Some((finding, total)) = total else { continue };
+            *count += 1;
+            for effect in ["actuator_lag", "command_delay"] {
+                assert!(finding.support_set.iter().any(|own| own == effect), "{:?}", finding.support_set);
+            }
+            assert!((0.15..=0.30).contains(&total.value), "robot {robot}: {} s", total.value);
+        }
+        if let [Some((_, six)), Some((_, two))] = totals {
+            let apart = (six.value - two.value).abs();
+            let allowed = half_width(six).hypot(half_width(two));
+            assert!(apart < allowed, "robot {robot}: {} s and {} s, +-{allowed}", six.value, two.value);
+        }
+    }
+    assert!(on_six >= 4 && on_two >= 4, "found on {on_six} and {on_two} of 5 robots");
+}
+
+#[test]
+fn what_was_fitted_on_one_dataset_predicts_headings_of_the_other_a_tenth_better_than_refitted_scales() {
+    let [six, two] = recordings();
+    let mut all: Vec<Direction> = Vec::new();
+    for (diagnosis, fit_on, test_on) in [(&diagnoses()[0], six, two), (&diagnoses()[1], two, six)] {
+        all.extend(directions(test_on, &refitted(fit_on, test_on), &corrected(diagnosis, test_on), 5.0));
+    }
+    assert_eq!(all.len(), 10);
+    let heading = mean_of(&all, Of::Heading);
+    assert!(heading.mean >= 0.10 && heading.ci95[0] > 0.0, "{heading:?}");
+    let position = mean_of(&all, Of::Position);
+    assert!(position.mean >= 0.0, "{position:?}");
+}
