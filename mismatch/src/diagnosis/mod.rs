@@ -12,6 +12,7 @@ mod entries;
 mod fit;
 mod held_out;
 mod known;
+mod lag;
 mod naming;
 mod noise;
 mod parallel;

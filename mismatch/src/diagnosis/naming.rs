@@ -141,7 +141,7 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
     let main = &estimated[0];
     let effect = main.term.effect;
     let one_off = is_impulse(effect);
-    let total = total(fit, covariance, group);
+    let total = total(&acting, (fit, covariance, group));
     let relevant = acting
         .iter()
         .flat_map(|unit| estimated.iter().filter_map(|own| own.is_relevant(unit)))
@@ -167,13 +167,20 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
     Judged { estimated, total, verdict, p_familywise, channel, place, one_off }
 }
 
-/// Lag and delay together: without encoders their sum is known far better than either.
-fn total(fit: &Fit, covariance: &DMatrix<f64>, group: &[usize]) -> Option<(String, Estimate)> {
-    let &[first, second] = group else { return None };
-    let [a, b] = [first, second].map(|term| fit.slots.iter().position(|slot| *slot == (term, 0)));
-    let (a, b) = (a?, b?);
-    let variance = covariance[(a, a)] + covariance[(b, b)] + 2.0 * covariance[(a, b)];
-    let value = fit.terms[first].values[0] + fit.terms[second].values[0];
+/// Lag and delay together: without encoders their sum is known far better than either, and one of them may
+/// have vanished.
+fn total(
+    units: &[&Unit<'_>],
+    (fit, covariance, group): (&Fit, &DMatrix<f64>, &[usize]),
+) -> Option<(String, Estimate)> {
+    let main = &fit.terms[*group.first()?];
+    if twin(main.effect).is_none() || !is_unseen(units, main) {
+        return None;
+    }
+    let slot = |term: &usize| fit.slots.iter().position(|slot| *slot == (*term, 0));
+    let slots: Vec<usize> = group.iter().map(slot).collect::<Option<_>>()?;
+    let variance: f64 = slots.iter().flat_map(|&a| slots.iter().map(move |&b| covariance[(a, b)])).sum();
+    let value: f64 = group.iter().map(|&term| fit.terms[term].values[0]).sum();
     let half = Z_95 * variance.max(0.0).sqrt();
     Some(("total_s".to_owned(), Estimate { value, unit: "s".to_owned(), ci95: [value - half, value + half] }))
 }

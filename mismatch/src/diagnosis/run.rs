@@ -10,9 +10,10 @@ use crate::builtin;
 use crate::diagnose::{DiagnoseOptions, Diagnosis, TruthUse};
 use crate::diagnosis::corrected;
 use crate::diagnosis::entries::{Entries, entries};
-use crate::diagnosis::fit::{Effort, Fit, State, states};
+use crate::diagnosis::fit::{Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
-use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, is_unseen, judge, twin};
+use crate::diagnosis::lag::paired;
+use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, judge};
 use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
@@ -319,25 +320,6 @@ impl Judgement {
 fn kept(fit: &Fit, judgements: &[Judgement]) -> Vec<Term> {
     let found = judgements.iter().filter(|own| own.judged.verdict.is_some());
     found.flat_map(|own| own.group.iter().map(|&term| fit.terms[term].clone())).collect()
-}
-
-/// Where lag or delay was found without encoders, both are fitted: only their sum is well known.
-fn paired(units: &[&Unit<'_>], fit: Fit) -> Option<Fit> {
-    let mut terms = fit.terms.clone();
-    for (position, term) in fit.terms.iter().enumerate() {
-        let Some(twin) = twin(term.effect) else { continue };
-        let known = fit.terms.iter().any(|other| other.effect == twin && other.whose == term.whose);
-        if !known && is_unseen(units, term) {
-            // A lag of zero moves predictions as a delay does, and no step leaves it. So each begins with half.
-            let half: Vec<f64> = term.values.iter().map(|value| 0.5 * value).collect();
-            terms[position].values.clone_from(&half);
-            terms.push(Term::new(twin, term.whose, half));
-        }
-    }
-    if terms.len() == fit.terms.len() {
-        return Some(fit);
-    }
-    crate::diagnosis::fit::fit(units, terms, &|_| true, Effort::FULL)
 }
 
 fn overall(findings: &[Finding], units: &[&Unit<'_>]) -> Verdict {

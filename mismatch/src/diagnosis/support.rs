@@ -7,7 +7,7 @@ use pleiad_physics::Effect;
 
 use crate::diagnosis::candidate::Candidate;
 use crate::diagnosis::fit::{Effort, Fit, fit};
-use crate::diagnosis::naming::Estimated;
+use crate::diagnosis::naming::{Estimated, is_unseen, twin};
 use crate::diagnosis::parallel;
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::select::{Pool, Scored, covariance, fit_beside, overlap, score, whites};
@@ -117,6 +117,9 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &P
     });
     let mut members: Vec<Effect> = group.iter().map(|&term| full.terms[term].effect).collect();
     members.extend(fitted.into_iter().flatten());
+    if is_unseen(units, chosen) {
+        members.extend(twin(chosen.effect).filter(|twin| !members.contains(twin)));
+    }
     Some(Support { units: own, without, with, group: positions, covariance, members, inflation })
 }
 
