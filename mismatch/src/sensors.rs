@@ -110,11 +110,7 @@ pub(crate) fn heading_plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Head
 }
 
 /// Position, in the robot's true frame: forward and left.
-pub(crate) fn gps<S: Scalar>(
-    track: &Track,
-    plan: &Plan<Fix>,
-    model: &RobotModel<S>,
-) -> ChannelResiduals<S> {
+pub(crate) fn gps<S: Scalar>(track: &Track, plan: &Plan<Fix>, model: &RobotModel<S>) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(Channel::Gps, plan);
     let sigma = model.nominal.gps_sigma_m;
     for Fix { at, measured_m: [x_m, y_m] } in &plan.items {

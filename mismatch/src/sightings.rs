@@ -1,7 +1,7 @@
 //! Ranges and bearings against their prediction from the true poses.
 
-use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_estimation::sample::{Reading, Relative, Target};
+use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_physics::chain::sensors::{self as chain, Seen};
 use pleiad_physics::predict::{self, Instant, Path};
 use pleiad_physics::{Context, Effect, RobotModel, Scalar, signal};

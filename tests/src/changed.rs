@@ -113,6 +113,7 @@ fn reorder(own: &mut RobotRecording, order: &[usize]) {
 }
 
 /// The positions of stamps, block by block in a random order.
+#[allow(clippy::float_cmp, reason = "whole numbers")]
 fn permuted(stamps: &[Timestamp], block_s: f64, random: &mut impl Rng) -> Vec<usize> {
     let Some(&first) = stamps.first() else { return Vec::new() };
     let block = |time: &Timestamp| (time.seconds_since(first) / block_s).floor();

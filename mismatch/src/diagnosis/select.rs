@@ -144,11 +144,7 @@ pub(crate) fn whites<'u, 'a>(units: &[&'u Unit<'a>], fit: &'u Fit) -> Vec<White<
     each.map(|((unit, state), columns)| White::new(unit, state, columns)).collect()
 }
 
-pub(crate) fn score(
-    units: &[&Unit<'_>],
-    whites: &[White<'_, '_>],
-    candidate: &Candidate,
-) -> Option<Scored> {
+pub(crate) fn score(units: &[&Unit<'_>], whites: &[White<'_, '_>], candidate: &Candidate) -> Option<Scored> {
     let all = candidate.columns(units);
     let own: Vec<&White<'_, '_>> = all.iter().map(|(unit, _)| &whites[*unit]).collect();
     let columns: Vec<&[_]> = all.iter().map(|(_, columns)| columns.as_slice()).collect();
@@ -237,30 +233,37 @@ fn additions(
     parallel::map(&groups, |rivals| choose(units, whites, current, rivals)).into_iter().flatten().collect()
 }
 
-/// Fits the strongest rivals and gives the best of them, fitted.
+/// Fits the strongest rivals and gives the best of them, fitted. Where none of these keeps what its
+/// linearization promised (a few wild readings promise much), the next strongest have their turn.
 fn choose(
     units: &[&Unit<'_>],
     whites: &[White<'_, '_>],
     current: &Fit,
     rivals: &[&Scored],
 ) -> Option<Fit> {
-    let best = rivals.first()?.step.gain;
-    let close = rivals.iter().take_while(|rival| rival.step.gain > LEAST_SHARE * best).count();
-    let rivals = &rivals[..close.min(RIVALS)];
-    let inflation = rivals.iter().map(|rival| rival.step.inflation).fold(f64::INFINITY, f64::min).max(1.0);
-    let fitted: Vec<Option<(f64, Fit)>> = parallel::map(rivals, |rival| {
-        let rival = refine(units, whites, rival);
-        let added = fit_beside(units, current, rival.term())?;
-        added.terms.last()?.is_inside().then(|| (criterion(units, current, &added, inflation), added))
-    });
-    // Of equals the first: the one whose linearization was the strongest.
-    let mut best: Option<(f64, Fit)> = None;
-    for (value, fit) in fitted.into_iter().flatten() {
-        if best.as_ref().is_none_or(|(most, _)| value > *most) {
-            best = Some((value, fit));
+    let mut rest = rivals;
+    while let Some(first) = rest.first() {
+        let close = rest.iter().take_while(|rival| rival.step.gain > LEAST_SHARE * first.step.gain).count();
+        let (tried, later) = rest.split_at(close.clamp(1, RIVALS));
+        let inflation = tried.iter().map(|rival| rival.step.inflation).fold(f64::INFINITY, f64::min).max(1.0);
+        let fitted: Vec<Option<(f64, Fit)>> = parallel::map(tried, |rival| {
+            let rival = refine(units, whites, rival);
+            let added = fit_beside(units, current, rival.term())?;
+            added.terms.last()?.is_inside().then(|| (criterion(units, current, &added, inflation), added))
+        });
+        // Of equals the first: the one whose linearization was the strongest.
+        let mut best: Option<(f64, Fit)> = None;
+        for (value, fit) in fitted.into_iter().flatten() {
+            if value > best.as_ref().map_or(0.0, |(most, _)| *most) {
+                best = Some((value, fit));
+            }
         }
+        if let Some((_, fit)) = best {
+            return Some(fit);
+        }
+        rest = later;
     }
-    best.map(|(_, fit)| fit)
+    None
 }
 
 /// A fit in which some units and their terms are replaced by those of another, which has one more term.
@@ -314,7 +317,7 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
         terms.iter().map(|term| whose == Whose::Everyone || term.whose == whose).collect();
     let known: Vec<State> = own.iter().map(|&unit| current.states[unit].clone()).collect();
     let states = with_another(&acting, &known, &terms)?;
-    fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL)
+    Some(fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL))
 }
 
 /// What a fit with one more term gains by Bayes' information criterion on the effective sample size; more is

@@ -8,6 +8,9 @@ use pleiad_recording::Recording;
 
 use crate::changed;
 
+/// An effect, the label of a parameter, and what becomes of its value.
+pub type Move = (Effect, &'static str, fn(f64) -> f64);
+
 /// A change of a recording with the structure in which it shows.
 pub struct Change {
     /// In words.
@@ -15,7 +18,7 @@ pub struct Change {
     /// The effects that are fitted.
     pub effects: &'static [Effect],
     /// The parameters that it moves: effect, label, and from what it was without the change to what it becomes.
-    pub moves: &'static [(Effect, &'static str, fn(f64) -> f64)],
+    pub moves: &'static [Move],
     apply: fn(Recording) -> Recording,
 }
 

@@ -1,7 +1,12 @@
 //! The diagnosis of real robots, fitted on one MRCLAM dataset and judged on another: what
 //! `docs/benchmarks/mrclam-diagnosis.md` reports and `tests/recordings_mrclam_diagnosis.rs` claims.
 
-#![allow(clippy::panic, clippy::expect_used, clippy::missing_panics_doc, reason = "helpers of tests fail by panicking")]
+#![allow(
+    clippy::panic,
+    clippy::expect_used,
+    clippy::missing_panics_doc,
+    reason = "helpers of tests fail by panicking"
+)]
 
 mod differences;
 

@@ -160,6 +160,7 @@ impl Family<'_, '_> {
     }
 
     /// The likelihood with these members active; the search begins at `from`, with new ones at their start.
+    #[allow(clippy::float_cmp, reason = "the off value itself")]
     fn fit(&self, active: &[usize], from: &Optimum, kept: &dyn Fn(usize) -> bool) -> Optimum {
         let mut start = from.parameters.clone();
         for (index, member) in self.members.iter().enumerate() {
@@ -257,13 +258,13 @@ impl Family<'_, '_> {
             .map(|rival| self.members[rival].effect)
             .collect();
         let known = self.known(active, with)?;
-        let gain = self.gain(active, &others, with);
+        let gain = self.gain((active, with), (&others, &without));
         let channel = self.channel(with, &without);
         Some(Shows { member, with: with.clone(), known, p, gain, channel, rivals })
     }
 
     /// What a member adds to the log-density of folds that neither likelihood saw.
-    fn gain(&self, active: &[usize], others: &[usize], with: &Optimum) -> Gain {
+    fn gain(&self, with: (&[usize], &Optimum), without: (&[usize], &Optimum)) -> Gain {
         let mut sums: Vec<Vec<f64>> = self.units.iter().map(|unit| vec![0.0; unit.blocks + 1]).collect();
         let (mut high, mut low) = (vec![0.0; self.places.len()], vec![0.0; self.places.len()]);
         let blocks = blocks(&self.units, &self.places);
@@ -282,8 +283,8 @@ impl Family<'_, '_> {
                 let (place, fold) = (&self.places[row], fold(&self.places[row]));
                 place.time_s < fold.start - EMBARGO_S || place.time_s >= fold.end + EMBARGO_S
             };
-            self.density.fill(&self.fit(active, with, &kept).parameters, &mut high);
-            self.density.fill(&self.fit(others, with, &kept).parameters, &mut low);
+            self.density.fill(&self.fit(with.0, with.1, &kept).parameters, &mut high);
+            self.density.fill(&self.fit(without.0, without.1, &kept).parameters, &mut low);
             for (row, place) in self.places.iter().enumerate() {
                 if fold(place).contains(&place.time_s) {
                     sums[place.unit][blocks[row] - firsts[place.unit]] += bounded_gain(high[row] - low[row]);

@@ -1,5 +1,5 @@
-//! Maximum likelihood of a few parameters on many rows, whatever their densities: ascent by the outer product
-//! of the rows' scores (`berndt1974`), damped, within bounds.
+//! Maximum likelihood of a few parameters on many rows, whatever their densities: quasi-Newton ascent
+//! (`nocedal2006`, BFGS) within bounds, begun with the outer product of the rows' scores for a curvature.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,9 +8,13 @@ use crate::diagnosis::white::floored;
 /// Largest number of steps.
 const STEPS: usize = 60;
 /// The ascent ends where a step gains less than this in log-likelihood.
-const CONVERGED: f64 = 1e-5;
-/// Steps are given up at this damping.
-const MAX_DAMPING: f64 = 1e6;
+const CONVERGED: f64 = 1e-4;
+/// Steps are given up below this share of their length.
+const SHORTEST: f64 = 1e-6;
+/// A step must gain this share of what its slope promises.
+const LEAST_GAIN: f64 = 1e-4;
+/// The diagonal is raised by this share.
+const RIDGE: f64 = 1e-9;
 /// Finite differences, as a share of a parameter's scale.
 const SHARE: f64 = 1e-4;
 
@@ -95,45 +99,61 @@ pub(super) fn maximize(
     clamp(&mut parameters, bounds, free);
     let mut values = vec![0.0; density.rows()];
     let mut best = total(density, &parameters, kept, &mut values);
-    let mut damping = 1e-3;
+    let mut scores = scores_at(density, bounds, &parameters, free, kept);
+    let mut gradient = sums(&scores);
+    // The inverse of minus the curvature of those that move.
+    let mut inverse: Option<(Vec<usize>, DMatrix<f64>)> = None;
     for _ in 0..STEPS {
-        let scores = scores(density, bounds, &parameters, free, kept);
-        let (gradient, outer) = normal(&scores);
         // A parameter at a bound that wants beyond it stays.
         let moving: Vec<usize> = (0..free.len())
             .filter(|&position| {
                 let (value, own) = (parameters[free[position]], bounds[free[position]]);
                 let stuck = (value <= own.low && gradient[position] <= 0.0)
                     || (value >= own.high && gradient[position] >= 0.0);
-                !stuck && outer[(position, position)] > 0.0
+                !stuck && scores[position].iter().any(|score| *score != 0.0)
             })
             .collect();
         if moving.is_empty() {
             break;
         }
+        let fresh = inverse.as_ref().is_none_or(|(known, _)| *known != moving);
+        if fresh {
+            inverse = outer_inverse(&scores, &moving).map(|outer| (moving.clone(), outer));
+        }
+        let Some((_, approximation)) = &mut inverse else { break };
+        let slope = DVector::from_fn(moving.len(), |i, _| gradient[moving[i]]);
+        let direction = &*approximation * &slope;
+        let promised = direction.dot(&slope);
         let before = best;
-        while damping < MAX_DAMPING {
-            let moved = step(&gradient, &outer, &moving, damping).map(|step| {
-                let mut moved = parameters.clone();
-                for (&position, change) in moving.iter().zip(step.iter()) {
-                    moved[free[position]] += change;
-                }
-                clamp(&mut moved, bounds, free);
-                moved
-            });
-            if let Some(moved) = moved {
-                let after = total(density, &moved, kept, &mut values);
-                if after > best {
-                    (best, parameters) = (after, moved);
-                    damping = (damping * 0.1).max(1e-9);
-                    break;
-                }
+        let old = parameters.clone();
+        let mut length = 1.0;
+        while length > SHORTEST {
+            let mut moved = old.clone();
+            for (&position, change) in moving.iter().zip(direction.iter()) {
+                moved[free[position]] += length * change;
             }
-            damping *= 10.0;
+            clamp(&mut moved, bounds, free);
+            let after = total(density, &moved, kept, &mut values);
+            if after > before + LEAST_GAIN * length * promised {
+                (best, parameters) = (after, moved);
+                break;
+            }
+            length *= 0.25;
         }
         if best - before < CONVERGED {
-            break;
+            if fresh {
+                break;
+            }
+            // What was learned of the curvature may mislead: once more from scratch.
+            inverse = None;
+            continue;
         }
+        scores = scores_at(density, bounds, &parameters, free, kept);
+        let next = sums(&scores);
+        let step = DVector::from_fn(moving.len(), |i, _| parameters[free[moving[i]]] - old[free[moving[i]]]);
+        let change = DVector::from_fn(moving.len(), |i, _| gradient[moving[i]] - next[moving[i]]);
+        update(approximation, &step, &change, fresh);
+        gradient = next;
     }
     Optimum { parameters, log_likelihood: best }
 }
@@ -162,7 +182,7 @@ pub(super) fn uncertainty(
         let at = |change: f64| {
             let mut moved = parameters.clone();
             moved[index] = (moved[index] + change).clamp(bounds[index].low, bounds[index].high);
-            (normal(&scores(density, bounds, &moved, &free, &all)).0, moved[index])
+            (sums(&scores_at(density, bounds, &moved, &free, &all)), moved[index])
         };
         let ((above, high), (below, low)) = (at(reach), at(-reach));
         for row in 0..size {
@@ -170,7 +190,7 @@ pub(super) fn uncertainty(
         }
     }
     curvature = 0.5 * (&curvature + curvature.transpose());
-    let scores = scores(density, bounds, parameters, &free, &all);
+    let scores = scores_at(density, bounds, parameters, &free, &all);
     let blocks = density.blocks();
     let count = blocks.iter().max().map_or(0, |last| last + 1);
     let mut sums: DMatrix<f64> = DMatrix::zeros(size, count);
@@ -197,7 +217,7 @@ fn reach(value: f64, bounds: &Bounds) -> f64 {
 }
 
 /// The derivatives of every row's log-density, by parameter; zero for rows that are not kept.
-fn scores(
+fn scores_at(
     density: &dyn Density,
     bounds: &[Bounds],
     parameters: &[f64],
@@ -221,35 +241,37 @@ fn scores(
     free.iter().map(one).collect()
 }
 
-/// The gradient, and the sum of the outer products of the rows' scores.
-fn normal(scores: &[Vec<f64>]) -> (DVector<f64>, DMatrix<f64>) {
-    let size = scores.len();
-    let gradient = DVector::from_fn(size, |index, _| scores[index].iter().sum());
-    let product = |row: usize, column: usize| scores[row].iter().zip(&scores[column]).map(|(a, b)| a * b).sum();
-    let mut outer = DMatrix::zeros(size, size);
-    for row in 0..size {
-        for column in 0..=row {
-            let value: f64 = product(row, column);
-            outer[(row, column)] = value;
-            outer[(column, row)] = value;
-        }
-    }
-    (gradient, outer)
+fn sums(scores: &[Vec<f64>]) -> DVector<f64> {
+    DVector::from_fn(scores.len(), |index, _| scores[index].iter().sum())
 }
 
-/// The step of the parameters at these positions.
-fn step(gradient: &DVector<f64>, outer: &DMatrix<f64>, moving: &[usize], damping: f64) -> Option<DVector<f64>> {
+/// The inverse of the sum of the outer products of the scores of those that move.
+fn outer_inverse(scores: &[Vec<f64>], moving: &[usize]) -> Option<DMatrix<f64>> {
     let size = moving.len();
-    let scale: Vec<f64> = moving.iter().map(|&own| outer[(own, own)].sqrt()).collect();
-    let mut scaled =
-        DMatrix::from_fn(size, size, |i, j| outer[(moving[i], moving[j])] / scale[i] / scale[j]);
-    for position in 0..size {
-        scaled[(position, position)] += damping;
+    let product = |i: usize, j: usize| -> f64 {
+        scores[moving[i]].iter().zip(&scores[moving[j]]).map(|(a, b)| a * b).sum()
+    };
+    let scale: Vec<f64> = (0..size).map(|i| product(i, i).sqrt()).collect();
+    let scaled = DMatrix::from_fn(size, size, |i, j| {
+        product(i, j) / scale[i] / scale[j] + if i == j { RIDGE } else { 0.0 }
+    });
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(size, size, |i, j| inverse[(i, j)] / scale[i] / scale[j]))
+}
+
+/// Learns from a step how far the gradient fell. The first time it learns the scale too.
+fn update(inverse: &mut DMatrix<f64>, step: &DVector<f64>, change: &DVector<f64>, first: bool) {
+    let product = step.dot(change);
+    if !(product > 0.0 && product.is_finite()) {
+        return;
     }
-    let right = DVector::from_fn(size, |i, _| gradient[moving[i]] / scale[i]);
-    let solved = scaled.cholesky()?.solve(&right);
-    let step = DVector::from_fn(size, |i, _| solved[i] / scale[i]);
-    step.iter().all(|change| change.is_finite()).then_some(step)
+    if first {
+        *inverse *= product / change.dot(&(&*inverse * change));
+    }
+    let through = &*inverse * change;
+    let scale = (1.0 + change.dot(&through) / product) / product;
+    *inverse += step * step.transpose() * scale;
+    *inverse -= (&through * step.transpose() + step * through.transpose()) / product;
 }
 
 fn clamp(parameters: &mut [f64], bounds: &[Bounds], free: &[usize]) {

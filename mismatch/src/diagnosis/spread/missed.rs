@@ -12,12 +12,11 @@
 
 use pleiad_physics::predict;
 use pleiad_physics::{Effect, RobotModel};
-use pleiad_recording::NominalRangeSensor;
 
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
-use crate::diagnosis::spread::scans::{CHANNELS, Scan, actual, scans, targets};
+use crate::diagnosis::spread::scans::{CHANNELS, Scan, actual, in_view, scans, targets};
 use crate::diagnosis::unit::Unit;
 use crate::sensors::At;
 use crate::track::median_step;
@@ -33,6 +32,9 @@ const GATE: f64 = 6.0;
 /// A declared detection probability of one counts as one miss in a thousand, as in the effect.
 const LEAST_MISS_ODDS: f64 = 1e-3;
 
+/// The logarithm of the smallest probability that is told from zero.
+const LEAST_LOG: f64 = -700.0;
+
 /// One opportunity.
 struct Row {
     /// Range, metres, and squared bearing, rad^2.
@@ -44,6 +46,8 @@ struct Opportunities {
     rows: Vec<Row>,
     blocks: Vec<usize>,
     declared_logit: f64,
+    /// Probability that it was seen and lost its name to another, of which a scan keeps one.
+    displaced: f64,
 }
 
 impl Density for Opportunities {
@@ -62,9 +66,13 @@ impl Density for Opportunities {
                 + parameters[CONSTANT]
                 + parameters[CONSTANT + 1] * range
                 + parameters[CONSTANT + 2] * square;
-            // log(1/(1 + exp(-logit))) of a miss, and of a detection with the sign turned.
-            let turned = if row.missed { logit } else { -logit };
-            *value = -if turned < -30.0 { -turned } else { libm::log1p(libm::exp(-turned)) };
+            let missed = 1.0 / (1.0 + libm::exp(-logit));
+            let kept = 1.0 - self.displaced;
+            *value = if row.missed {
+                libm::log((missed * kept + self.displaced).max(f64::MIN_POSITIVE))
+            } else {
+                libm::log1p(-missed).max(LEAST_LOG) + libm::log(kept)
+            };
         }
     }
 }
@@ -75,8 +83,8 @@ pub(super) fn obstacle(units: &[&Unit<'_>]) -> Option<String> {
     (!declared).then(|| "no range sensor was declared: nobody knows what it should have seen".to_owned())
 }
 
-/// What one robot could see, under a fit of the mean.
-pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family<'u, 'a>> {
+/// What one robot could see, under a fit of the mean; so many sightings were displaced by wrong names.
+pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit, displaced: f64) -> Option<Family<'u, 'a>> {
     let mut rows = Vec::new();
     let mut places = Vec::new();
     let mut probability: f64 = 1.0;
@@ -85,7 +93,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
         probability = nominal.range_sensor.detection_probability;
         let model = unit.model(&fit.terms);
         for kind in 0..CHANNELS.len() {
-            collect(position, unit, &model, &nominal.range_sensor, kind, &mut rows, &mut places);
+            collect(position, unit, &model, kind, &mut rows, &mut places);
         }
     }
     if rows.is_empty() || probability <= 0.0 {
@@ -107,7 +115,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
     let own: Vec<usize> = (CONSTANT..CONSTANT + 3).collect();
     Some(Family {
         bounds: bounds.collect(),
-        density: Box::new(Opportunities { blocks: blocks(units, &places), rows, declared_logit }),
+        density: Box::new(Opportunities { blocks: blocks(units, &places), rows, declared_logit, displaced }),
         units: units.to_vec(),
         places,
         start: vec![0.0; 3],
@@ -128,7 +136,6 @@ fn collect(
     position: usize,
     unit: &Unit<'_>,
     model: &RobotModel<f64>,
-    sensor: &NominalRangeSensor,
     kind: usize,
     rows: &mut Vec<Row>,
     places: &mut Vec<Place>,
@@ -140,20 +147,14 @@ fn collect(
     }
     let sigmas = [unit.nominal.nominal.range_sigma_m, unit.nominal.nominal.bearing_sigma_rad];
     let margins = sigmas.map(|sigma| MARGIN_SIGMAS * sigma);
-    let in_view = |range_m: f64, bearing_rad: f64| {
-        range_m > sensor.min_range_m + margins[0]
-            && range_m < sensor.max_range_m - margins[0]
-            && (bearing_rad.abs() < sensor.half_fov_rad - margins[1]
-                || sensor.half_fov_rad >= std::f64::consts::PI)
-    };
     for (time_s, scan) in instants(unit, &own) {
         let Some(at) = At::new(unit.evidence, unit.robot, track, time_s) else { continue };
         let instant = &at.bare();
         for (target, seen) in targets(unit, kind, time_s) {
-            let predicted = predict::sighting(model, instant, &seen);
-            if !in_view(predicted.range_m, predicted.bearing_rad) {
+            if !in_view(unit, model, instant, &seen, margins) {
                 continue;
             }
+            let predicted = predict::sighting(model, instant, &seen);
             let reported = scan.is_some_and(|scan| {
                 scan.readings.iter().any(|reading| {
                     let (errors, _) = reading.errors(model, &seen);
@@ -197,4 +198,3 @@ fn instants<'s, 'a>(unit: &Unit<'_>, own: &'s [Scan<'a>]) -> Vec<(f64, Option<&'
     }
     found
 }
-

@@ -4,7 +4,7 @@
 //! A second stage, on the residuals of the fitted mean. Each group of effects that show in the same rows has a
 //! likelihood of its own ([`sighted`], [`walk`], [`executed`], [`missed`]), in which the noise levels are
 //! estimated too; [`family`] selects among its effects, [`judge`] applies the rules of evidence of the first
-//! stage, with the tests of both counted.
+//! stage, with the tests of both counted. [`ticks`] are counted and [`swap`] is looked for before the first.
 //!
 //! [`select`]: crate::diagnosis::select
 
@@ -17,6 +17,8 @@ mod missed;
 mod report;
 mod scans;
 mod sighted;
+mod swap;
+mod ticks;
 mod walk;
 
 use std::collections::BTreeSet;
@@ -24,18 +26,21 @@ use std::collections::BTreeSet;
 use pleiad_estimation::RobotId;
 use pleiad_physics::Effect;
 
+use crate::diagnosis::entries::Entries;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::held_out::Gain;
 use crate::diagnosis::naming::Judged;
 use crate::diagnosis::parallel;
 use crate::diagnosis::select::Entry;
-use crate::diagnosis::spread::family::Family;
+use crate::diagnosis::spread::family::{Family, Shows};
 use crate::diagnosis::term::Whose;
 use crate::diagnosis::unit::Unit;
 use crate::findings::{Undetected, Untestable};
 
+pub(crate) use swap::{Swaps, swaps};
+
 /// The effects that this stage estimates.
-const EFFECTS: [Effect; 7] = [
+const EFFECTS: [Effect; 10] = [
     Effect::RangeDependentNoise,
     Effect::MotionBlur,
     Effect::HeavyTails,
@@ -43,18 +48,33 @@ const EFFECTS: [Effect; 7] = [
     Effect::MissedDetections,
     Effect::GyroRandomWalk,
     Effect::CommandJitter,
+    Effect::CommandLoss,
+    Effect::EncoderCoarse,
+    Effect::LandmarkIdentitySwap,
 ];
 
-/// Whether an effect is one of spread or chance.
-pub(crate) fn is_spread(effect: Effect) -> bool {
-    EFFECTS.contains(&effect) || effect == Effect::CommandLoss
+/// Takes the entries of this stage out of those of the first, and adds what only this stage can test.
+pub(crate) fn take(entries: &mut Entries, units: &[&Unit<'_>]) -> Vec<Entry> {
+    let is_own = |entry: &Entry| EFFECTS.contains(&entry.0);
+    let (mut own, mean): (Vec<Entry>, Vec<Entry>) = entries.entries.drain(..).partition(is_own);
+    entries.entries = mean;
+    for robot in robots(units) {
+        let entry = (Effect::EncoderCoarse, Whose::Robot(robot));
+        if ticks::recorded(&of_robot(units, robot)) && !own.contains(&entry) {
+            own.push(entry);
+            let tested = |known: &Untestable| known.effect == entry.0.name() && known.robot == Some(robot.0);
+            entries.untestable.retain(|known| !tested(known));
+        }
+    }
+    own
 }
 
-/// Takes the entries of this stage out of those of the first.
-pub(crate) fn take(entries: &mut Vec<Entry>) -> Vec<Entry> {
-    let (own, mean) = entries.drain(..).partition(|(effect, _)| is_spread(*effect));
-    *entries = mean;
-    own
+fn robots(units: &[&Unit<'_>]) -> BTreeSet<RobotId> {
+    units.iter().map(|unit| unit.robot).collect()
+}
+
+fn of_robot<'u, 'a>(units: &[&'u Unit<'a>], robot: RobotId) -> Vec<&'u Unit<'a>> {
+    units.iter().copied().filter(|unit| unit.robot == robot).collect()
 }
 
 /// An effect of spread that some robots show.
@@ -73,69 +93,139 @@ pub(crate) struct Spread {
     pub(crate) terms: Vec<SpreadTerm>,
     pub(crate) undetected: Vec<Undetected>,
     pub(crate) untestable: Vec<Untestable>,
-    /// Terms of the mean that an effect of spread explains, by position, with the reason.
-    pub(crate) explained: Vec<(usize, Effect)>,
+    pub(crate) explained: Vec<Explained>,
 }
 
-/// The families of a robot that have effects among the entries.
-type Build = for<'u, 'a> fn(&[&'u Unit<'a>], &Fit) -> Option<Family<'u, 'a>>;
-const FAMILIES: [(&[Effect], Build); 4] = [
-    (
-        &[Effect::RangeDependentNoise, Effect::MotionBlur, Effect::HeavyTails, Effect::IdentityMixUp],
-        sighted::family,
-    ),
-    (&[Effect::MissedDetections], missed::family),
-    (&[Effect::GyroRandomWalk], walk::family),
-    (&[Effect::CommandJitter, Effect::CommandLoss], executed::family),
-];
+/// A term of the mean of which an effect of spread explains a part, or all.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Explained {
+    /// The position of the term in the fit.
+    pub(crate) position: usize,
+    pub(crate) by: Effect,
+    /// What it explains of the term's first parameter; `None` if nothing is left of the term.
+    pub(crate) part: Option<f64>,
+}
+
+/// Effects that are looked for together.
+#[derive(Clone, Copy)]
+enum Group {
+    Sightings,
+    Gyro,
+    Commands,
+}
+
+impl Group {
+    const ALL: [Self; 3] = [Self::Sightings, Self::Gyro, Self::Commands];
+
+    fn effects(self) -> &'static [Effect] {
+        match self {
+            Self::Sightings => &EFFECTS[..5],
+            Self::Gyro => &EFFECTS[5..6],
+            Self::Commands => &EFFECTS[6..8],
+        }
+    }
+
+    fn spread(self, units: &[&Unit<'_>], fit: &Fit, robot: RobotId, tests: usize) -> Spread {
+        let of_family = |family: Option<Family<'_, '_>>| {
+            family.map_or_else(Spread::default, |family| of_family(&family, fit, robot, tests))
+        };
+        match self {
+            Self::Sightings => {
+                let mut all = of_family(sighted::family(units, fit));
+                let mixed = all.terms.iter().map(|own| &own.judged.estimated.term);
+                let mixed = mixed.filter(|term| term.effect == Effect::IdentityMixUp).map(|term| term.values[0]);
+                let displaced = sighted::displaced(units, mixed.sum());
+                all.join(of_family(missed::family(units, fit, displaced)));
+                all
+            }
+            Self::Gyro => of_family(walk::family(units, fit)),
+            Self::Commands => of_family(executed::family(units, fit)),
+        }
+    }
+}
 
 /// Looks for effects of spread among the entries, beside a fit of the mean and among so many tests.
-pub(crate) fn spread(units: &[&Unit<'_>], fit: &Fit, entries: &[Entry], tests: usize) -> Spread {
-    let robots: BTreeSet<RobotId> = units.iter().map(|unit| unit.robot).collect();
+pub(crate) fn spread(
+    units: &[&Unit<'_>],
+    fit: &Fit,
+    entries: &[Entry],
+    swaps: &Swaps,
+    tests: usize,
+) -> Spread {
+    let has = |effect: Effect, robot: RobotId| entries.contains(&(effect, Whose::Robot(robot)));
     let mut jobs = Vec::new();
-    for &robot in &robots {
-        for (effects, build) in FAMILIES {
-            if effects.iter().any(|&effect| entries.contains(&(effect, Whose::Robot(robot)))) {
-                jobs.push((robot, build));
+    for robot in robots(units) {
+        for group in Group::ALL {
+            if group.effects().iter().any(|&effect| has(effect, robot)) {
+                jobs.push((robot, group));
             }
         }
     }
-    let parts = parallel::map(&jobs, |&(robot, build)| {
-        let own: Vec<&Unit<'_>> = units.iter().copied().filter(|unit| unit.robot == robot).collect();
-        build(&own, fit).map_or_else(Spread::default, |family| of_family(&family, fit, robot, tests))
-    });
-    let mut all = Spread::default();
+    let parts = parallel::map(&jobs, |&(robot, group)| group.spread(&of_robot(units, robot), fit, robot, tests));
+    let mut all = Spread { terms: swaps.terms(tests), ..Spread::default() };
     for part in parts {
-        all.terms.extend(part.terms);
-        all.undetected.extend(part.undetected);
-        all.explained.extend(part.explained);
+        all.join(part);
+    }
+    for robot in robots(units).into_iter().filter(|&robot| has(Effect::EncoderCoarse, robot)) {
+        all.terms.extend(ticks::coarse(&of_robot(units, robot), robot, tests));
     }
     all.untestable = untestable(units, entries);
     all
+}
+
+impl Spread {
+    fn join(&mut self, other: Self) {
+        self.terms.extend(other.terms);
+        self.undetected.extend(other.undetected);
+        self.untestable.extend(other.untestable);
+        self.explained.extend(other.explained);
+    }
 }
 
 fn of_family(family: &Family<'_, '_>, fit: &Fit, robot: RobotId, tests: usize) -> Spread {
     let base = family.base();
     let shows = family.select(&base, tests);
     let found: Vec<Effect> = shows.iter().map(|own| family.members[own.member].effect).collect();
-    let mut own = Spread { undetected: judge::undetected(family, &base, &found, robot, tests), ..Spread::default() };
+    let mut own =
+        Spread { undetected: judge::undetected(family, &base, &found, robot, tests), ..Spread::default() };
     for shows in &shows {
         let effect = family.members[shows.member].effect;
         // Effects of the mean that a family knows as rivals are the mean's to name.
-        if is_spread(effect) {
+        if EFFECTS.contains(&effect) {
             own.terms.push(judge::judged(family, shows, robot, tests));
         }
     }
+    own.explained = explained(family, &shows, &own.terms, fit);
     own.undetected.retain(|undetected| EFFECTS.iter().any(|effect| effect.name() == undetected.effect));
-    let _ = fit;
     own
+}
+
+/// What those that are findings explain of the mean.
+fn explained(family: &Family<'_, '_>, shows: &[Shows], terms: &[SpreadTerm], fit: &Fit) -> Vec<Explained> {
+    let mut all = Vec::new();
+    for shows in shows {
+        let effect = family.members[shows.member].effect;
+        let is_finding =
+            |own: &SpreadTerm| own.judged.estimated[0].term.effect == effect && own.judged.verdict.is_some();
+        if !terms.iter().any(is_finding) {
+            continue;
+        }
+        match effect {
+            Effect::GyroRandomWalk => all.extend(walk::explained(family, shows, fit)),
+            Effect::CommandJitter | Effect::CommandLoss => {
+                all.extend(executed::explained(family, shows, effect, fit));
+            }
+            _ => {}
+        }
+    }
+    all
 }
 
 fn untestable(units: &[&Unit<'_>], entries: &[Entry]) -> Vec<Untestable> {
     let mut all = Vec::new();
     for &(effect, whose) in entries {
         let Whose::Robot(robot) = whose else { continue };
-        let own: Vec<&Unit<'_>> = units.iter().copied().filter(|unit| unit.robot == robot).collect();
+        let own = of_robot(units, robot);
         let why = if effect == Effect::MissedDetections { missed::obstacle(&own) } else { None };
         if let Some(why) = why {
             all.push(Untestable { effect: effect.name().to_owned(), robot: Some(robot.0), why });

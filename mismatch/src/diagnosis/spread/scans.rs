@@ -3,7 +3,8 @@
 use pleiad_estimation::LandmarkId;
 use pleiad_estimation::sample::Target;
 use pleiad_physics::chain::sensors::Seen;
-use pleiad_physics::{RobotModel, Scalar, predict};
+use pleiad_physics::predict::{self, Instant};
+use pleiad_physics::{RobotModel, Scalar};
 
 use crate::channel::Channel;
 use crate::diagnosis::unit::Unit;
@@ -83,13 +84,42 @@ fn is_same(range: &Sighted, bearing: &Sighted) -> bool {
 pub(super) fn targets(unit: &Unit<'_>, kind: usize, time_s: f64) -> Vec<(Target, Seen)> {
     let evidence = unit.evidence;
     if kind == 0 {
-        let landmark = |(&id, place): (&LandmarkId, &[f64; 2])| (Target::Landmark(id), Seen::landmark(id.0, *place));
+        let landmark =
+            |(&id, place): (&LandmarkId, &[f64; 2])| (Target::Landmark(id), Seen::landmark(id.0, *place));
         return evidence.recording.landmarks.iter().map(landmark).collect();
     }
     let others = evidence.tracks.keys().filter(|robot| **robot != unit.robot);
     others
         .filter_map(|&robot| Some((Target::Robot(robot), seen(evidence, Target::Robot(robot), time_s).ok()?)))
         .collect()
+}
+
+/// Whether the declared sensor has a target in view at an instant, by this margin of range and bearing; yes if
+/// none is declared.
+pub(super) fn in_view(
+    unit: &Unit<'_>,
+    model: &RobotModel<f64>,
+    instant: &Instant,
+    seen: &Seen,
+    margins: [f64; 2],
+) -> bool {
+    let Some(nominal) = &unit.evidence.recording.nominal else { return true };
+    let sensor = &nominal.range_sensor;
+    let predicted = predict::sighting(model, instant, seen);
+    let half_fov_rad = sensor.half_fov_rad;
+    predicted.range_m > sensor.min_range_m + margins[0]
+        && predicted.range_m < sensor.max_range_m - margins[0]
+        && (predicted.bearing_rad.abs() < half_fov_rad - margins[1] || half_fov_rad >= std::f64::consts::PI)
+}
+
+/// Whether a robot ever gave one name to two sightings of an instant. A sensor that does not has dropped one of
+/// them.
+pub(super) fn repeats(units: &[&Unit<'_>]) -> bool {
+    let twice = |scan: &Scan<'_>| {
+        let named = |index: usize| scan.readings[index].sighted.target;
+        (1..scan.readings.len()).any(|index| (0..index).any(|other| named(other) == named(index)))
+    };
+    units.iter().any(|unit| (0..CHANNELS.len()).any(|kind| scans(unit, kind).iter().any(twice)))
 }
 
 /// What a sighting is of under a model that may swap names.

@@ -3,12 +3,14 @@
 //! Of a sighting that names target A at range `r` and bearing `b`, with the others of its kind in view,
 //!
 //! ```text
-//! density = (1 - p) f(A) + p/n sum over others B of f(B),   f = t((r - r_B)/sigma_r) t((b - b_B)/sigma_b)
+//! density = (1 - k p) f(A) + k p/n sum over others B of f(B),   f = t((r - r_B)/sigma_r) t((b - b_B)/sigma_b)
 //! sigma_r = a + s1 r + s2 r^2,   sigma_b = c + s |w|
 //! ```
 //!
 //! with `a` and `c` estimated per kind of target, `t` Student's, and `n` the number of other sightings of that
-//! kind at the same instant: an identity is drawn among what was seen.
+//! kind at the same instant: a name is drawn among what was seen. A wrong name is therefore there twice. A
+//! recording that holds no name twice has kept one of the two, and of wrong names half: `k = 1/2`, and one more
+//! was seen than is recorded. Otherwise `k = 1`.
 
 use pleiad_physics::{Effect, Floors, RobotModel};
 
@@ -16,7 +18,7 @@ use crate::diagnosis::fit::Fit;
 use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
-use crate::diagnosis::spread::scans::{CHANNELS, actual, scans, targets};
+use crate::diagnosis::spread::scans::{CHANNELS, actual, in_view, repeats, scans, targets};
 use crate::diagnosis::unit::Unit;
 
 /// Parameters: the logarithms of the least sigma, of range and bearing, to landmarks and to robots.
@@ -51,6 +53,8 @@ struct Row {
 struct Sightings {
     rows: Vec<Row>,
     blocks: Vec<usize>,
+    /// The share of wrong names that are recorded.
+    kept: f64,
 }
 
 impl Sightings {
@@ -73,8 +77,8 @@ impl Density for Sightings {
 
     fn fill(&self, parameters: &[f64], into: &mut [f64]) {
         let student = Student::new(parameters[TAILS]);
-        let mixed = libm::exp(parameters[MIXED]);
-        let (own, other) = (libm::log1p(-mixed), parameters[MIXED]);
+        let mixed = self.kept * libm::exp(parameters[MIXED]);
+        let (own, other) = (libm::log1p(-mixed), libm::log(mixed));
         for (row, value) in self.rows.iter().zip(into) {
             let sigmas = Self::sigmas(row, parameters);
             let of = |errors: &[Option<f64>; 2]| -> f64 {
@@ -83,10 +87,11 @@ impl Density for Sightings {
                 };
                 errors.iter().zip(&sigmas).map(part).sum()
             };
-            *value = of(&row.errors);
+            let named = of(&row.errors);
+            *value = named;
             if row.choices > 0 && mixed > 0.0 {
                 let others = row.others.iter().map(of).fold(f64::NEG_INFINITY, log_sum);
-                *value = log_sum(own + *value, other + others - libm::log(row.choices as f64));
+                *value = log_sum(own + named, other + others - libm::log(row.choices as f64));
             }
         }
     }
@@ -96,8 +101,9 @@ impl Density for Sightings {
 pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family<'u, 'a>> {
     let mut rows = Vec::new();
     let mut places = Vec::new();
+    let repeats = repeats(units);
     for (position, unit) in units.iter().enumerate() {
-        collect(position, unit, &unit.model(&fit.terms), &mut rows, &mut places);
+        collect(position, unit, &unit.model(&fit.terms), repeats, &mut rows, &mut places);
     }
     if rows.is_empty() {
         return None;
@@ -134,7 +140,13 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
     bounds.push(reach(Effect::MotionBlur, 0, 0.003));
     bounds.push(Bounds { low: 0.0, high: 1.0, scale: 0.05 });
     bounds.push(Bounds { low: NEVER, high: -0.7, scale: 0.3 });
-    let mut start: Vec<f64> = (0..4).map(|index| base(index).ln()).collect();
+    // Where no effect explains wild errors, the spread is that of all.
+    let whole = |index: usize| -> f64 {
+        let own = rows.iter().filter(|row| row.kind == index / 2).filter_map(|row| row.errors[index % 2]);
+        let (sum, count) = own.fold((0.0, 0.0), |(sum, count), error| (sum + error * error, count + 1.0));
+        if sum > 0.0 { (sum / count).sqrt() } else { 1.0 }
+    };
+    let mut start: Vec<f64> = (0..4).map(|index| whole(index).ln()).collect();
     start.extend([0.0, 0.0, 0.0, 0.0, f64::NEG_INFINITY]);
     let mut members = Vec::new();
     if has(0) {
@@ -172,7 +184,8 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
             chances: Some(choosable),
         });
     }
-    let density = Sightings { blocks: blocks(units, &places), rows };
+    let kept = kept(repeats);
+    let density = Sightings { blocks: blocks(units, &places), rows, kept };
     let units = units.to_vec();
     Some(Family { units, places, density: Box::new(density), bounds, start, nuisances: known, members })
 }
@@ -209,11 +222,22 @@ fn range_noise(units: &[&Unit<'_>], rows: &[Row], known: &[usize]) -> Option<Mem
     })
 }
 
+/// The share of wrong names that are recorded.
+fn kept(repeats: bool) -> f64 {
+    if repeats { 1.0 } else { 0.5 }
+}
+
+/// The share of sightings that are not recorded because another bears their name.
+pub(super) fn displaced(units: &[&Unit<'_>], probability: f64) -> f64 {
+    (1.0 - kept(repeats(units))) * probability
+}
+
 /// The sightings of a unit.
 fn collect(
     position: usize,
     unit: &Unit<'_>,
     model: &RobotModel<f64>,
+    repeats: bool,
     rows: &mut Vec<Row>,
     places: &mut Vec<Place>,
 ) {
@@ -228,13 +252,21 @@ fn collect(
                     continue;
                 }
                 let others = targets.iter().filter(|(target, _)| *target != named);
+                let instant = &own.sighted.at.instant;
+                let choices = if repeats {
+                    scan.readings.len() - 1
+                } else if others.clone().any(|(_, seen)| in_view(unit, model, instant, seen, [0.0; 2])) {
+                    scan.readings.len()
+                } else {
+                    0
+                };
                 rows.push(Row {
                     kind,
                     range_m,
                     yaw_rate_rad_s: own.sighted.at.motion.yaw_rate_rad_s,
                     errors,
                     others: others.map(|(_, seen)| own.errors(model, seen).0).collect(),
-                    choices: scan.readings.len() - 1,
+                    choices,
                 });
                 let channel = channels[usize::from(own.measured[0].is_none())];
                 places.push(Place { unit: position, time_s: scan.time_s, channel });
