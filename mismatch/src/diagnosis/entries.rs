@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use pleiad_estimation::RobotId;
 use pleiad_physics::{Channel as Needed, Effect, EffectInfo, Stage};
 
 use crate::channel::Channel;
@@ -18,8 +19,21 @@ pub(crate) struct Entries {
     pub(crate) untestable: Vec<Untestable>,
 }
 
+/// Below this, seconds, there are too few blocks of time for a robust variance.
+pub(crate) const SHORT_S: f64 = 20.0;
+
+/// For how long a robot can be compared in these units together, seconds.
+pub(crate) fn lasting_s(units: &[&Unit<'_>], robot: RobotId) -> f64 {
+    units.iter().filter(|unit| unit.robot == robot).map(|unit| unit.span_s.1 - unit.span_s.0).sum()
+}
+
 /// Sorts the catalogue into what the units allow and what they do not.
 pub(crate) fn entries(units: &[&Unit<'_>]) -> Entries {
+    let obstacle = |effect: Effect, unit: &Unit<'_>| {
+        let lasting_s = lasting_s(units, unit.robot);
+        let short = || format!("{lasting_s:.1} s can be compared, {SHORT_S} s are needed");
+        obstacle(effect, unit).or_else(|| (lasting_s < SHORT_S).then(short))
+    };
     let robots: BTreeSet<_> = units.iter().map(|unit| unit.robot).collect();
     let mut sorted = Entries { entries: Vec::new(), untestable: Vec::new() };
     for &effect in Effect::ALL {

@@ -9,7 +9,7 @@ use pleiad_recording::Recording;
 use crate::builtin;
 use crate::diagnose::{DiagnoseOptions, Diagnosis, TruthUse};
 use crate::diagnosis::corrected;
-use crate::diagnosis::entries::{Entries, entries};
+use crate::diagnosis::entries::{Entries, SHORT_S, entries, lasting_s};
 use crate::diagnosis::fit::{Effort, Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
 use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, is_unseen, judge, twin};
@@ -65,15 +65,17 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         .map(|(index, own, robot, model)| unit(index, own, robot, model))
         .collect();
     let swaps = spread::swaps(&mut all);
+    let fitted: Vec<&Unit<'_>> = all.iter().filter(|unit| !prepared[unit.recording].tested).collect();
+    let enough = |unit: &&Unit<'_>| lasting_s(&fitted, unit.robot) >= SHORT_S;
     let units: Vec<&Unit<'_>> =
-        all.iter().filter(|unit| !prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
+        fitted.iter().copied().filter(|unit| !unit.rows.is_empty()).filter(enough).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
-    let mut entries =
-        entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let mut entries = entries(&fitted);
+    let tried = entries.entries.len();
     let spread_entries = spread::take(&mut entries, &units);
 
-    let mut notes = notes(&prepared, &all);
+    let mut notes = notes(&prepared, &all, &fitted);
     let selected = select(&units, &entries.entries);
     let Some(Selected { fit, tests: count, mut pool }) = selected else {
         return Ok(nothing(&prepared, entries, notes, units.is_empty()));
@@ -128,7 +130,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         prepared.iter().filter(|own| own.tested == tested).map(|own| own.recording.name.clone()).collect()
     };
     let findings = Findings {
-        verdict: overall(&findings, &units),
+        verdict: overall(&findings, tried, entries.untestable.len()),
         recordings: recordings.iter().map(|recording| recording.name.clone()).collect(),
         fit_on: names(false),
         test_on: names(true),
@@ -184,7 +186,7 @@ pub(crate) fn unit<'a>(
 }
 
 /// What could not be compared at all.
-fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
+fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>], fitted: &[&Unit<'_>]) -> Vec<String> {
     let mut notes = Vec::new();
     for unit in units {
         let name = &prepared[unit.recording].recording.name;
@@ -194,22 +196,23 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
                 notes.push(format!("{name}, robot {}, {}: {omission}", unit.robot, stretch.channel));
             }
         }
-        let (first_s, last_s) = unit.span_s;
-        if !unit.rows.is_empty() && last_s - first_s < SHORT_S {
-            notes.push(format!(
-                "{name}, robot {}: {:.1} s can be compared; below {SHORT_S} s nothing is named",
-                unit.robot,
-                last_s - first_s
-            ));
+    }
+    let mut robots: Vec<RobotId> = fitted.iter().map(|unit| unit.robot).collect();
+    robots.sort_unstable();
+    robots.dedup();
+    for (robot, lasting_s) in robots.into_iter().map(|robot| (robot, lasting_s(fitted, robot))) {
+        if lasting_s < SHORT_S {
+            notes.push(format!("robot {robot}: {lasting_s:.1} s can be compared; below {SHORT_S} s nothing is"));
         }
+    }
+    for own in prepared.iter().filter(|own| own.models.is_empty()) {
+        notes.push(format!("{}: no robot recorded anything", own.recording.name));
     }
     notes
 }
 
 /// What one row in so many lacks is not worth a note.
 const FEW: usize = 20;
-/// Below this, seconds, there are too few blocks of time for a robust variance.
-pub(crate) const SHORT_S: f64 = 20.0;
 
 fn judgements(
     units: &[&Unit<'_>],
@@ -338,13 +341,13 @@ fn paired(units: &[&Unit<'_>], fit: Fit) -> Option<Fit> {
     crate::diagnosis::fit::fit(units, terms, &|_| true, Effort::FULL)
 }
 
-fn overall(findings: &[Finding], units: &[&Unit<'_>]) -> Verdict {
+/// That nothing is missing is said if more could be tested than could not.
+fn overall(findings: &[Finding], tried: usize, untestable: usize) -> Verdict {
     let order = [Verdict::Named, Verdict::BadData, Verdict::CannotTell, Verdict::Unnameable];
-    let tested = units.iter().any(|unit| unit.span_s.1 - unit.span_s.0 >= SHORT_S);
     order
         .into_iter()
         .find(|verdict| findings.iter().any(|finding| finding.verdict == *verdict))
-        .unwrap_or(if tested { Verdict::NothingMissing } else { Verdict::Untestable })
+        .unwrap_or(if tried > untestable { Verdict::NothingMissing } else { Verdict::Untestable })
 }
 
 /// What is said where nothing could be compared.
