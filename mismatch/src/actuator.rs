@@ -17,6 +17,11 @@ use crate::windows::windows;
 const WINDOW_S: f64 = 0.2;
 /// After this long a servo has forgotten how it stood at the first command, seconds.
 pub(crate) const SETTLING_S: f64 = 0.6;
+/// In a part of a window the robot turns no more than this, radians: loads that depend on the heading are
+/// right to a thousandth.
+const MOST_TURN_RAD: f64 = 0.1;
+/// A window has no more parts.
+const MOST_PARTS: f64 = 8.0;
 /// A change of the set-point acts on a window that begins up to this much later, seconds.
 const CHANGE_REACH_S: f64 = 0.05;
 
@@ -25,6 +30,8 @@ pub(crate) struct Turning {
     /// From where the window before ended to where this begins: nothing is compared, the servo goes on.
     before: Option<CommandWindow>,
     pub(crate) window: CommandWindow,
+    /// The window, in parts in which the heading hardly changes.
+    parts: Vec<CommandWindow>,
     regime: Regime,
     /// By how much the wheels turned, left and right, radians; `None` where the prediction is not known.
     pub(crate) measured: Option<[f64; 2]>,
@@ -60,12 +67,16 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Turning> {
             plan.count(|count| Omission::NoWheels(robot, count));
             continue;
         };
-        let place = regime.pose.map(|pose| pose.position());
-        let between = |from_s, to_s| CommandWindow {
-            from_s,
-            to_s,
-            motion: motion(&regime, regime.pose.unwrap_or(Pose::identity())),
-            surroundings: evidence.surroundings(robot, middle_s, place),
+        let between = |from_s, to_s| {
+            let middle_s = f64::midpoint(from_s, to_s);
+            let regime = track.regime_at(middle_s).unwrap_or(regime);
+            let place = regime.pose.map(|pose| pose.position());
+            CommandWindow {
+                from_s,
+                to_s,
+                motion: motion(&regime, regime.pose.unwrap_or(Pose::identity())),
+                surroundings: evidence.surroundings(robot, middle_s, place),
+            }
         };
         let known = from.time_s >= first_s + SETTLING_S && to.time_s <= known_until_s;
         if !known {
@@ -74,6 +85,9 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Turning> {
         plan.items.push(Turning {
             before: (from.time_s > reached_s).then(|| between(reached_s, from.time_s)),
             window: between(from.time_s.max(reached_s), to.time_s),
+            parts: parts(from.time_s.max(reached_s), to.time_s, &regime)
+                .map(|(from_s, to_s)| between(from_s, to_s))
+                .collect(),
             regime,
             measured: known.then(|| [0, 1].map(|wheel| to.angle_rad[wheel] - from.angle_rad[wheel])),
             du_squared: du_squared(track, (from.time_s - CHANGE_REACH_S, to.time_s)),
@@ -81,6 +95,16 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Turning> {
         reached_s = to.time_s;
     }
     plan
+}
+
+/// Parts of a window, as many as it takes that the robot turns little in each.
+fn parts(from_s: f64, to_s: f64, regime: &Regime) -> impl Iterator<Item = (f64, f64)> {
+    let turned_rad = regime.yaw_rate_rad_s.abs() * (to_s - from_s);
+    // A window is short: there are never many.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let count = (turned_rad / MOST_TURN_RAD).ceil().clamp(1.0, MOST_PARTS) as u32;
+    let edge = move |index: u32| from_s + (to_s - from_s) * f64::from(index) / f64::from(count);
+    (0..count).map(move |index| (edge(index), if index + 1 == count { to_s } else { edge(index + 1) }))
 }
 
 /// The sum of the squared changes of the set-point, of both wheels' mean and of right minus left, (rad/s)^2.
@@ -111,7 +135,13 @@ pub(crate) fn residuals<S: Scalar>(
         if let Some(before) = &own.before {
             wheel_turns(model, schedule.within(before), before, &mut state);
         }
-        let predicted = wheel_turns(model, schedule.within(&own.window), &own.window, &mut state);
+        let mut predicted = [S::zero(); 2];
+        for part in &own.parts {
+            let turned = wheel_turns(model, schedule.within(part), part, &mut state);
+            for (sum, wheel) in predicted.iter_mut().zip(turned) {
+                *sum += wheel;
+            }
+        }
         let Some(measured) = own.measured else { continue };
         let [left, right] = [0, 1].map(|wheel| -predicted[wheel] + measured[wheel]);
         let middle_s = f64::midpoint(own.window.from_s, own.window.to_s);

@@ -32,6 +32,8 @@ pub(crate) struct Motion {
     /// The true pose at the beginning.
     pub(crate) start: Pose<f64>,
     pub(crate) surroundings: Surroundings,
+    /// Where the nearest other robot is at the beginning, in the middle and at the end.
+    partner_m: Option<[[f64; 2]; 3]>,
     /// The last of those reference poses, seen from the first.
     pub(crate) measured: Pose<f64>,
 }
@@ -52,6 +54,7 @@ impl Motion {
             ends: [self.window.first, self.window.last].map(|end| end - self.reach.start),
             start: self.start,
             surroundings: self.surroundings,
+            partner_m: self.partner_m,
         };
         truth_change(model, &window, self.stamps_s, state)
     }
@@ -91,6 +94,7 @@ pub(crate) fn plan_of_length(evidence: &Evidence<'_>, robot: RobotId, length_s: 
             stamps_s: [first.0, last.0],
             start,
             surroundings: evidence.surroundings(robot, middle_s, Some(start.position())),
+            partner_m: evidence.partner(robot, [from_s, middle_s, to_s], start.position()),
             measured: first.1.between(&last.1),
         });
         joined = Some(window.last);

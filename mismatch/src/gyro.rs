@@ -1,5 +1,7 @@
 //! The gyro against the yaw rate of the encoders.
 
+use std::ops::Range;
+
 use pleiad_estimation::RobotId;
 use pleiad_estimation::sample::Reading;
 use pleiad_physics::chain::body::BodyState;
@@ -11,7 +13,7 @@ use crate::channel::Channel;
 use crate::evidence::{Evidence, is_constant};
 use crate::plan::Plan;
 use crate::residual::{ChannelResiduals, Omission, Regime, Residual};
-use crate::track::Track;
+use crate::track::{Track, median_step};
 
 /// Length of a window, seconds.
 const WINDOW_S: f64 = 0.5;
@@ -57,19 +59,19 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Stretch> {
             _ => None,
         })
         .collect();
+    let cells = Cells::new(&readings);
     let mut plan = Plan::new();
-    let mut rest = readings.as_slice();
+    let mut begin = 0;
     // Where the window before ended.
     let mut ended_s = None;
-    while let Some(&(start_s, _)) = rest.first() {
-        let length = rest.partition_point(|(time_s, _)| *time_s < start_s + WINDOW_S);
-        let (window, later) = rest.split_at(length);
-        rest = later;
-        let Some(measured) = time_mean(window) else {
+    while begin < readings.len() {
+        let window = begin..cells.end(begin);
+        begin = window.end;
+        let Some((measured, variance_share)) = cells.mean(window.clone()) else {
             plan.count(Omission::SparseWindow);
             continue;
         };
-        let end_s = window[window.len() - 1].0;
+        let (start_s, end_s) = (cells.edge_before(window.start), cells.edge_after(window.end - 1));
         let middle_s = f64::midpoint(start_s, end_s);
         let (Some(wheels), Some(regime)) = (stretch(track, start_s, end_s), track.regime_at(middle_s)) else {
             plan.count(|count| Omission::NoWheels(robot, count));
@@ -87,7 +89,7 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Stretch> {
             start: start.unwrap_or(Pose::identity()),
             surroundings: evidence.surroundings(robot, middle_s, start.map(|pose| pose.position())),
             measured,
-            variance_share: variance_share(window.len()),
+            variance_share,
         });
     }
     plan
@@ -119,22 +121,66 @@ fn sigma<S: Scalar>(model: &RobotModel<S>, own: &Stretch) -> S {
     (noise.gyro_sigma_rad_s.square() * own.variance_share + noise.gyro_walk_variance * own.age_s).sqrt()
 }
 
-/// The mean over the time between the first and the last reading, by trapezoids: the encoders' turn over
-/// the same time is its prediction, whatever the phases of the two.
-fn time_mean(readings: &[(f64, f64)]) -> Option<f64> {
-    if readings.len() < MIN_READINGS {
-        return None;
-    }
-    let lasted_s = readings[readings.len() - 1].0 - readings[0].0;
-    let turned: f64 =
-        readings.windows(2).map(|pair| (pair[1].0 - pair[0].0) * f64::midpoint(pair[0].1, pair[1].1)).sum();
-    (lasted_s > 0.0).then(|| turned / lasted_s)
+/// Readings, each of which stands for the time around its stamp: to the middle between it and the next. A
+/// gyro reads the mean over its period or an instant in its middle; the encoders' turn over the same time is
+/// its prediction, whatever the phases of the two.
+struct Cells<'a> {
+    readings: &'a [(f64, f64)],
+    period_s: f64,
 }
 
-/// Of equally spaced readings by trapezoids: the two at the ends count half, so `n - 3/2` of `(n - 1)^2`.
-fn variance_share(readings: usize) -> f64 {
-    let count = readings as f64;
-    (count - 1.5) / (count - 1.0).powi(2)
+impl<'a> Cells<'a> {
+    fn new(readings: &'a [(f64, f64)]) -> Self {
+        Self { readings, period_s: median_step(readings.iter().map(|reading| reading.0)) }
+    }
+
+    /// Whether no reading lacks between this one and the next.
+    fn joins(&self, index: usize) -> bool {
+        self.readings
+            .get(index + 1)
+            .is_some_and(|next| next.0 - self.readings[index].0 <= 2.0 * self.period_s)
+    }
+
+    fn edge_after(&self, index: usize) -> f64 {
+        let time_s = self.readings[index].0;
+        if self.joins(index) {
+            f64::midpoint(time_s, self.readings[index + 1].0)
+        } else {
+            time_s + 0.5 * self.period_s
+        }
+    }
+
+    fn edge_before(&self, index: usize) -> f64 {
+        match index.checked_sub(1) {
+            Some(before) if self.joins(before) => self.edge_after(before),
+            _ => self.readings[index].0 - 0.5 * self.period_s,
+        }
+    }
+
+    /// Past the last reading of the window that begins with one.
+    fn end(&self, begin: usize) -> usize {
+        let until_s = self.readings[begin].0 + WINDOW_S;
+        let mut end = begin + 1;
+        while self.joins(end - 1) && self.readings[end].0 < until_s {
+            end += 1;
+        }
+        end
+    }
+
+    /// The mean of a window and its variance over that of a reading; `None` of too few readings.
+    fn mean(&self, window: Range<usize>) -> Option<(f64, f64)> {
+        if window.len() < MIN_READINGS {
+            return None;
+        }
+        let (mut sum, mut whole, mut squares) = (0.0, 0.0, 0.0);
+        for index in window {
+            let lasted_s = self.edge_after(index) - self.edge_before(index);
+            sum += lasted_s * self.readings[index].1;
+            whole += lasted_s;
+            squares += lasted_s * lasted_s;
+        }
+        (whole > 0.0).then(|| (sum / whole, squares / (whole * whole)))
+    }
 }
 
 /// The wheels from one instant to another, if they were recorded without a pause.

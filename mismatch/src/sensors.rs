@@ -49,8 +49,8 @@ impl At {
         Some(Self { time_s, motion: motion(&regime, pose), surroundings, regime, pose, reference, on_path })
     }
 
-    /// The instant for a model that leaves the reference alone.
-    pub(crate) fn bare(&self) -> Instant<'static> {
+    /// The instant alone: velocities are taken for constant.
+    pub(crate) fn plain(&self) -> Instant<'static> {
         let Self { time_s, motion, surroundings, .. } = *self;
         Instant { time_s, motion, surroundings, anchor: None, target: None }
     }
@@ -59,8 +59,7 @@ impl At {
     pub(crate) fn instant<'a>(&self, track: &'a Track) -> Instant<'a> {
         let (time_s, pose) = self.reference;
         let anchor = self.on_path.map(|on_path| Anchor { time_s, pose, path: track.path(), on_path });
-        let Self { time_s, motion, surroundings, .. } = *self;
-        Instant { time_s, motion, surroundings, anchor, target: None }
+        Instant { anchor, ..self.plain() }
     }
 }
 

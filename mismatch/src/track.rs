@@ -111,8 +111,8 @@ impl Track {
         motion.or_else(|| self.truth_missing())
     }
 
-    /// The wheels' angles at an instant: encoders are nearly free of noise, so they may be interpolated.
-    /// `None` outside the samples and in a pause.
+    /// The wheels' angles at an instant: encoders are nearly free of noise, so they may be interpolated, with
+    /// the acceleration between the steps before and after. `None` outside the samples and in a pause.
     pub(crate) fn wheels_at(&self, time_s: f64) -> Option<EncoderSample> {
         let after = self.encoders.partition_point(|sample| sample.time_s <= time_s);
         let before = *self.encoders.get(after.checked_sub(1)?)?;
@@ -123,11 +123,30 @@ impl Track {
         let next = self.encoders.get(after)?;
         let step_s = next.time_s - before.time_s;
         let share = since_s / step_s;
+        let bend = self.bend_rad(after - 1);
         let angle = |wheel: usize| {
-            before.angle_rad[wheel] + share * (next.angle_rad[wheel] - before.angle_rad[wheel])
+            let even = before.angle_rad[wheel] + share * (next.angle_rad[wheel] - before.angle_rad[wheel]);
+            even + share * (1.0 - share) * bend[wheel]
         };
         let steer_rad = before.steer_rad + share * (next.steer_rad - before.steer_rad);
         (step_s <= self.pause_s).then(|| EncoderSample { time_s, angle_rad: [angle(0), angle(1)], steer_rad })
+    }
+
+    /// By how much more than evenly each wheel has turned in the middle of the step that begins at a sample,
+    /// times four, radians.
+    fn bend_rad(&self, from: usize) -> [f64; 2] {
+        let samples = from.checked_sub(1).and_then(|first| self.encoders.get(first..from + 3));
+        let Some([before, from, to, after]) = samples else { return [0.0; 2] };
+        let spans_s = [from.time_s - before.time_s, to.time_s - from.time_s, after.time_s - to.time_s];
+        if spans_s.iter().any(|span_s| *span_s <= 0.0 || *span_s > self.pause_s) {
+            return [0.0; 2];
+        }
+        let reach_s = 0.5 * (spans_s[0] + spans_s[2]) + spans_s[1];
+        [0, 1].map(|wheel| {
+            let rate_before = (from.angle_rad[wheel] - before.angle_rad[wheel]) / spans_s[0];
+            let rate_after = (after.angle_rad[wheel] - to.angle_rad[wheel]) / spans_s[2];
+            -0.5 * spans_s[1] * spans_s[1] * (rate_after - rate_before) / reach_s
+        })
     }
 
     fn reckoned_at(&self, time_s: f64) -> Option<Reckoned> {

@@ -32,8 +32,8 @@ fn a_clean_recording_has_residuals_of_the_size_of_its_noise_and_none_on_average(
     let [truth, gyro, gps, heading, range, bearing] = SIGMAS;
     // A body residual has two truth samples in it, and forward and left the heading of one over up to 0.7 m.
     let body = truth * 2.0_f64.sqrt();
-    // 25 gyro readings by trapezoids: 24 intervals, the two ends with half weight.
-    let gyro = gyro * 23.5_f64.sqrt() / 24.0;
+    // The mean of 25 readings.
+    let gyro = gyro / 5.0;
     let expected = [
         (Channel::Body, 0, body),
         (Channel::Body, 1, body * 1.05),

@@ -235,12 +235,7 @@ fn additions(
 
 /// Fits the strongest rivals and gives the best of them, fitted. Where none of these keeps what its
 /// linearization promised (a few wild readings promise much), the next strongest have their turn.
-fn choose(
-    units: &[&Unit<'_>],
-    whites: &[White<'_, '_>],
-    current: &Fit,
-    rivals: &[&Scored],
-) -> Option<Fit> {
+fn choose(units: &[&Unit<'_>], whites: &[White<'_, '_>], current: &Fit, rivals: &[&Scored]) -> Option<Fit> {
     let mut rest = rivals;
     while let Some(first) = rest.first() {
         let close = rest.iter().take_while(|rival| rival.step.gain > LEAST_SHARE * first.step.gain).count();

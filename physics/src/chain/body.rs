@@ -42,17 +42,18 @@ pub struct BodyIncrement<S> {
 impl<S: Scalar> BodyIncrement<S> {
     /// The pose at the end of a step that began at `start`.
     pub fn applied_to(&self, start: &Pose<S>) -> Pose<S> {
-        let [forward_m, left_m, yaw_rad] = self.driven;
-        self.added_to(start.compose(&Pose::exp(forward_m, left_m, yaw_rad)), S::one())
+        self.share_applied_to(start, self.driven, S::one())
     }
 
-    /// The pose after a share of the step; before the step that ended at `start`, if the share is negative.
-    pub fn share_applied_to(&self, start: &Pose<S>, share: S) -> Pose<S> {
-        let [forward_m, left_m, yaw_rad] = self.driven.map(|part| part * share);
-        self.added_to(start.compose(&Pose::exp(forward_m, left_m, yaw_rad)), share)
-    }
-
-    fn added_to(&self, mut pose: Pose<S>, share: S) -> Pose<S> {
+    /// The pose after a share of the step, in which this is driven of it; before the step that ended at
+    /// `start`, if the share is negative.
+    pub fn share_applied_to(
+        &self,
+        start: &Pose<S>,
+        [forward_m, left_m, yaw_rad]: [S; 3],
+        share: S,
+    ) -> Pose<S> {
+        let mut pose = start.compose(&Pose::exp(forward_m, left_m, yaw_rad));
         pose.x_m += self.added.shift_m[0] * share;
         pose.y_m += self.added.shift_m[1] * share;
         pose.yaw_rad += self.added.yaw_rad * share;
@@ -134,15 +135,14 @@ pub fn increment<S: Scalar>(
     }
 }
 
-/// Where the nominal robot is in the middle of a step in which its wheels turn by these angles.
-pub(crate) fn nominal_middle<S: Scalar>(
+/// What the nominal robot drives when its wheels turn by these angles: forward (metres) and yaw (radians).
+pub(crate) fn nominal_motion<S: Scalar>(
     model: &RobotModel<S>,
     context: &Context<S>,
     turned_rad: [S; 2],
-) -> Pose<S> {
+) -> (S, S) {
     let rolled_m = turned_rad.map(|turned| model.nominal.wheel_radius * turned);
-    let (forward_m, yaw_rad) = kinematics(model.drive, context, &nominal_geometry(model), rolled_m);
-    context.motion.pose.compose(&Pose::exp(forward_m * 0.5, S::zero(), yaw_rad * 0.5))
+    kinematics(model.drive, context, &nominal_geometry(model), rolled_m)
 }
 
 /// The robot as its wheels see it.

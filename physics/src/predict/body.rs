@@ -1,7 +1,9 @@
 //! The motion of the body, predicted from encoders.
 
+use std::f64::consts::PI;
+
 use crate::chain::actuator::{Scheduled, turn};
-use crate::chain::body::{BodyIncrement, BodyState, advance, increment, nominal_middle};
+use crate::chain::body::{BodyIncrement, BodyState, advance, increment, nominal_motion};
 use crate::chain::robot::Robot;
 use crate::chain::sensors;
 use crate::context::{Context, Motion, Surroundings};
@@ -38,12 +40,16 @@ pub struct BodyWindow<'a> {
     pub start: Pose<f64>,
     /// Neighbours; the steering angle is that of the samples.
     pub surroundings: Surroundings,
+    /// Where the neighbour is in the map at the beginning, in the middle and at the end, metres; without it,
+    /// it stands where the surroundings have it.
+    pub partner_m: Option<[[f64; 2]; 3]>,
 }
 
 impl<'a> BodyWindow<'a> {
     /// From the first to the last of these samples, with nothing known around them.
     pub fn whole(samples: &'a [EncoderSample], start: Pose<f64>, surroundings: Surroundings) -> Self {
-        Self { track: samples, ends: [0, samples.len().saturating_sub(1)], start, surroundings }
+        let ends = [0, samples.len().saturating_sub(1)];
+        Self { track: samples, ends, start, surroundings, partner_m: None }
     }
 
     fn samples(&self) -> &'a [EncoderSample] {
@@ -73,16 +79,64 @@ impl<'a> BodyWindow<'a> {
         state: &mut BodyState<S>,
     ) -> BodyIncrement<S> {
         let turned = [0, 1].map(|wheel| S::constant(to.angle_rad[wheel] - from.angle_rad[wheel]));
-        let mut motion = Motion::at_rest(pose);
-        motion.wheel_angle_rad = from.angle_rad.map(S::constant);
-        let steer_rad = f64::midpoint(from.steer_rad, to.steer_rad);
-        let mut context = Context {
-            surroundings: Surroundings { steer_rad, ..self.surroundings },
-            ..Context::new(&model.nominal, from.time_s, motion).over(S::constant(to.time_s - from.time_s))
-        };
+        let mut context = self.context(model, [from, to], pose);
         // Effects of heading and place act as in the middle of the step.
-        context.motion.pose = nominal_middle(model, &context, turned);
+        let (forward_m, yaw_rad) = nominal_motion(model, &context, turned);
+        context.motion.pose = pose.compose(&Pose::exp(forward_m * 0.5, S::zero(), yaw_rad * 0.5));
         increment(model, &context, turned, state)
+    }
+
+    fn context<'m, S: Scalar>(
+        &self,
+        model: &'m RobotModel<S>,
+        [from, to]: [&EncoderSample; 2],
+        pose: Pose<S>,
+    ) -> Context<'m, S> {
+        let mut motion = Motion::at_rest(pose);
+        // An encoder shows the last tick passed: the wheel is half a tick beyond, on average.
+        let ticks = model.nominal.encoder_ticks_per_rev;
+        let half_tick_rad = if ticks > 0.0 { S::constant(PI) / ticks } else { S::zero() };
+        motion.wheel_angle_rad = from.angle_rad.map(|angle_rad| half_tick_rad + angle_rad);
+        let steer_rad = f64::midpoint(from.steer_rad, to.steer_rad);
+        let partner_m = self.partner_at(f64::midpoint(from.time_s, to.time_s));
+        Context {
+            surroundings: Surroundings { steer_rad, partner_m, ..self.surroundings },
+            ..Context::new(&model.nominal, from.time_s, motion).over(S::constant(to.time_s - from.time_s))
+        }
+    }
+
+    /// Where the neighbour is: on the parabola through its three places.
+    fn partner_at(&self, time_s: f64) -> Option<[f64; 2]> {
+        let Some([first, middle, last]) = self.partner_m else { return self.surroundings.partner_m };
+        let half_s = 0.5 * self.duration_s();
+        let share = if half_s > 0.0 { (time_s - self.middle_s()) / half_s } else { 0.0 };
+        Some([0, 1].map(|axis| {
+            let slope = 0.5 * (last[axis] - first[axis]);
+            let bend = 0.5 * (last[axis] + first[axis]) - middle[axis];
+            middle[axis] + share * (slope + share * bend)
+        }))
+    }
+
+    /// By how much more than evenly the robot has driven in the middle of the step that begins at a sample,
+    /// times four: forward, left (metres), yaw (radians). The wheels speed up as from the step before to the
+    /// step after; without those they do not.
+    fn bend<S: Scalar>(&self, model: &RobotModel<S>, from: usize) -> [S; 3] {
+        let none = [S::zero(); 3];
+        let samples = from.checked_sub(1).and_then(|first| self.track.get(first..from + 3));
+        let Some([before, from, to, after]) = samples else { return none };
+        let spans_s = [from.time_s - before.time_s, to.time_s - from.time_s, after.time_s - to.time_s];
+        if spans_s.iter().any(|span_s| *span_s <= 0.0) {
+            return none;
+        }
+        let reach_s = 0.5 * (spans_s[0] + spans_s[2]) + spans_s[1];
+        let bent = [0, 1].map(|wheel| {
+            let rate_before = (from.angle_rad[wheel] - before.angle_rad[wheel]) / spans_s[0];
+            let rate_after = (after.angle_rad[wheel] - to.angle_rad[wheel]) / spans_s[2];
+            S::constant(-0.5 * spans_s[1] * spans_s[1] * (rate_after - rate_before) / reach_s)
+        });
+        let context = self.context(model, [from, to], Pose::identity());
+        let (forward_m, yaw_rad) = nominal_motion(model, &context, bent);
+        [forward_m, S::zero(), yaw_rad]
     }
 }
 
@@ -183,7 +237,8 @@ fn carried<S: Scalar>(
             return match samples {
                 Some([from, to]) if to.time_s > from.time_s => {
                     let step = window.step(model, [from, to], pose, &mut state);
-                    step.share_applied_to(&pose, rest_s / (to.time_s - from.time_s))
+                    let share = rest_s / (to.time_s - from.time_s);
+                    step.share_applied_to(&pose, step.driven.map(|part| part * share), share)
                 }
                 _ => pose,
             };
@@ -194,9 +249,14 @@ fn carried<S: Scalar>(
             let ends = if forth { [here, there] } else { [there, here] };
             let step = window.step(model, ends, pose, &mut state);
             if rest_s.value().abs() < step_s {
-                return step.share_applied_to(&pose, rest_s / step_s);
+                let share = rest_s / step_s;
+                let bend = window.bend(model, at.min(next));
+                let size = share * sense;
+                let curve = size * (S::one() - size);
+                let driven = [0, 1, 2].map(|part| step.driven[part] * share + bend[part] * curve);
+                return step.share_applied_to(&pose, driven, share);
             }
-            pose = step.share_applied_to(&pose, S::constant(sense));
+            pose = step.share_applied_to(&pose, step.driven.map(|part| part * sense), S::constant(sense));
             last = Some([at.min(next), at.max(next)]);
             rest_s -= S::constant(sense * step_s);
         }

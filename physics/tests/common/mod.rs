@@ -142,6 +142,7 @@ fn body<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
             ends: [first, first + 25],
             start: motion(from_s).pose,
             surroundings: surroundings(from_s),
+            partner_m: (first % 2 == 0).then_some([[0.7, 0.4], [0.8, 0.4], [0.9, 0.5]]),
         };
         // Reference poses between samples, by a different way at each end.
         let [first_s, last_s] = window.stamps_s();

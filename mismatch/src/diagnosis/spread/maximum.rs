@@ -76,7 +76,10 @@ impl Uncertainty {
             let solved = naive.cholesky()?.solve(&robust);
             Some(solved.trace() / which.len().max(1) as f64)
         };
-        self.parts(which).and_then(inflated).filter(|value| value.is_finite()).map_or(1.0, |value| value.max(1.0))
+        self.parts(which)
+            .and_then(inflated)
+            .filter(|value| value.is_finite())
+            .map_or(1.0, |value| value.max(1.0))
     }
 
     /// The Wald statistic of a departure of some parameters.

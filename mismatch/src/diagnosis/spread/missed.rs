@@ -149,7 +149,7 @@ fn collect(
     let margins = sigmas.map(|sigma| MARGIN_SIGMAS * sigma);
     for (time_s, scan) in instants(unit, &own) {
         let Some(at) = At::new(unit.evidence, unit.robot, track, time_s) else { continue };
-        let instant = &at.bare();
+        let instant = &at.plain();
         for (target, seen) in targets(unit, kind, time_s) {
             if !in_view(unit, model, instant, &seen, margins) {
                 continue;

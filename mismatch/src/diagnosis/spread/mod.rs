@@ -132,8 +132,9 @@ impl Group {
         match self {
             Self::Sightings => {
                 let mut all = of_family(sighted::family(units, fit));
-                let mixed = all.terms.iter().map(|own| &own.judged.estimated.term);
-                let mixed = mixed.filter(|term| term.effect == Effect::IdentityMixUp).map(|term| term.values[0]);
+                let mixed = all.terms.iter().map(|own| &own.judged.estimated[0].term);
+                let mixed =
+                    mixed.filter(|term| term.effect == Effect::IdentityMixUp).map(|term| term.values[0]);
                 let displaced = sighted::displaced(units, mixed.sum());
                 all.join(of_family(missed::family(units, fit, displaced)));
                 all
@@ -161,7 +162,8 @@ pub(crate) fn spread(
             }
         }
     }
-    let parts = parallel::map(&jobs, |&(robot, group)| group.spread(&of_robot(units, robot), fit, robot, tests));
+    let parts =
+        parallel::map(&jobs, |&(robot, group)| group.spread(&of_robot(units, robot), fit, robot, tests));
     let mut all = Spread { terms: swaps.terms(tests), ..Spread::default() };
     for part in parts {
         all.join(part);

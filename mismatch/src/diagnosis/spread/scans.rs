@@ -27,7 +27,7 @@ pub(super) struct Reading<'s> {
 impl Reading<'_> {
     /// Range and bearing minus those predicted for a target, and the range predicted.
     pub(super) fn errors(&self, model: &RobotModel<f64>, seen: &Seen) -> ([Option<f64>; 2], f64) {
-        let predicted = predict::sighting(model, &self.sighted.at.bare(), seen);
+        let predicted = predict::sighting(model, &self.sighted.at.plain(), seen);
         let range = self.measured[0].map(|range_m| range_m - predicted.range_m);
         let bearing = self.measured[1].map(|bearing_rad| (bearing_rad - predicted.bearing_rad).wrapped());
         ([range, bearing], predicted.range_m)
@@ -126,7 +126,7 @@ pub(super) fn repeats(units: &[&Unit<'_>]) -> bool {
 pub(super) fn actual(model: &RobotModel<f64>, reading: &Reading<'_>) -> Target {
     let named = reading.sighted.target;
     if sightings::renames(model) {
-        sightings::actual(model, &reading.sighted.at.bare(), named)
+        sightings::actual(model, &reading.sighted.at.plain(), named)
     } else {
         named
     }

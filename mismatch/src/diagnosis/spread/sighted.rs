@@ -252,7 +252,7 @@ fn collect(
                     continue;
                 }
                 let others = targets.iter().filter(|(target, _)| *target != named);
-                let instant = &own.sighted.at.instant;
+                let instant = &own.sighted.at.plain();
                 let choices = if repeats {
                     scan.readings.len() - 1
                 } else if others.clone().any(|(_, seen)| in_view(unit, model, instant, seen, [0.0; 2])) {
