@@ -90,21 +90,31 @@ fn obstacle(effect: Effect, unit: &Unit<'_>) -> Option<String> {
     if Channel::ALL.iter().any(shows) {
         return None;
     }
-    let reasons: Vec<String> = unit
-        .stretches
-        .iter()
-        .filter(|stretch| touches(effect, stretch.channel))
-        .flat_map(|stretch| &stretch.omissions)
-        .map(ToString::to_string)
-        .collect::<BTreeSet<String>>()
-        .into_iter()
-        .collect();
-    let missing = if reasons.is_empty() {
-        "nothing to compare it with was recorded".to_owned()
-    } else {
-        reasons.join("; ")
+    let reasons = omissions(effect, unit);
+    let nothing = || "nothing to compare it with was recorded".to_owned();
+    Some(if reasons.is_empty() { nothing() } else { reasons.join("; ") })
+}
+
+/// What is missing in the channels of an effect.
+fn omissions(effect: Effect, unit: &Unit<'_>) -> Vec<String> {
+    let own = unit.stretches.iter().filter(|stretch| touches(effect, stretch.channel));
+    let reasons: BTreeSet<String> =
+        own.flat_map(|stretch| &stretch.omissions).map(ToString::to_string).collect();
+    reasons.into_iter().collect()
+}
+
+/// An effect that was tried and changes no prediction of what was recorded.
+pub(crate) fn unseen(units: &[&Unit<'_>], (effect, whose): Entry) -> Untestable {
+    let (robot, unit) = match whose {
+        Whose::Robot(robot) => (Some(robot.0), units.iter().find(|unit| unit.robot == robot)),
+        Whose::Everyone => (None, units.first()),
     };
-    Some(missing)
+    let mut why = "it would change nothing of what can be compared".to_owned();
+    let reasons = unit.map_or_else(Vec::new, |unit| omissions(effect, unit));
+    if !reasons.is_empty() {
+        why = format!("{why} ({})", reasons.join("; "));
+    }
+    Untestable { effect: effect.name().to_owned(), robot, why }
 }
 
 /// The effects that an effect is the same as, together: a cause that shows in two elementary ways. The

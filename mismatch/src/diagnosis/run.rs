@@ -9,14 +9,14 @@ use pleiad_recording::Recording;
 use crate::builtin;
 use crate::diagnose::{DiagnoseOptions, Diagnosis, TruthUse};
 use crate::diagnosis::corrected;
-use crate::diagnosis::entries::{Entries, SHORT_S, entries, lasting_s};
+use crate::diagnosis::entries::{Entries, SHORT_S, entries, lasting_s, unseen};
 use crate::diagnosis::fit::{Effort, Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
 use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, is_unseen, judge, twin};
 use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
-use crate::diagnosis::select::{Pool, Selected, select};
+use crate::diagnosis::select::{Entry, Pool, Selected, select};
 use crate::diagnosis::series;
 use crate::diagnosis::spread::{self, SpreadTerm};
 use crate::diagnosis::support::{Support, support};
@@ -72,7 +72,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let mut entries = entries(&fitted);
-    let tried = entries.entries.len();
+    let tried = entries.entries.len() + entries.untestable.len();
     let spread_entries = spread::take(&mut entries, &units);
 
     let mut notes = notes(&prepared, &all, &fitted);
@@ -85,6 +85,11 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     };
     let count = count + spread_entries.len() + swaps.tests;
     let scored = pool.scored(&units, &entries.entries, &fit);
+    let shows: BTreeSet<Entry> =
+        pool.candidates().map(|candidate| (candidate.term.effect, candidate.term.whose)).collect();
+    let known = |entry: &Entry| shows.contains(entry) || fit.terms.iter().any(|term| term.effect == entry.0);
+    let hidden = entries.entries.iter().copied().filter(|entry| !known(entry));
+    entries.untestable.extend(hidden.map(|entry| unseen(&units, entry)));
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
     let spread = spread::spread(&units, &fit, &spread_entries, &swaps, count);
@@ -202,7 +207,9 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>], fitted: &[&Unit<'_>]) ->
     robots.dedup();
     for (robot, lasting_s) in robots.into_iter().map(|robot| (robot, lasting_s(fitted, robot))) {
         if lasting_s < SHORT_S {
-            notes.push(format!("robot {robot}: {lasting_s:.1} s can be compared; below {SHORT_S} s nothing is"));
+            notes.push(format!(
+                "robot {robot}: {lasting_s:.1} s can be compared; below {SHORT_S} s nothing is"
+            ));
         }
     }
     for own in prepared.iter().filter(|own| own.models.is_empty()) {
@@ -341,13 +348,13 @@ fn paired(units: &[&Unit<'_>], fit: Fit) -> Option<Fit> {
     crate::diagnosis::fit::fit(units, terms, &|_| true, Effort::FULL)
 }
 
-/// That nothing is missing is said if more could be tested than could not.
+/// That nothing is missing is said if, of what was `tried`, more could be tested than could not.
 fn overall(findings: &[Finding], tried: usize, untestable: usize) -> Verdict {
     let order = [Verdict::Named, Verdict::BadData, Verdict::CannotTell, Verdict::Unnameable];
     order
         .into_iter()
         .find(|verdict| findings.iter().any(|finding| finding.verdict == *verdict))
-        .unwrap_or(if tried > untestable { Verdict::NothingMissing } else { Verdict::Untestable })
+        .unwrap_or(if tried > 2 * untestable { Verdict::NothingMissing } else { Verdict::Untestable })
 }
 
 /// What is said where nothing could be compared.
