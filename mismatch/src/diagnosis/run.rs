@@ -85,11 +85,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     };
     let count = count + spread_entries.len() + swaps.tests;
     let scored = pool.scored(&units, &entries.entries, &fit);
-    let shows: BTreeSet<Entry> =
-        pool.candidates().map(|candidate| (candidate.term.effect, candidate.term.whose)).collect();
-    let known = |entry: &Entry| shows.contains(entry) || fit.terms.iter().any(|term| term.effect == entry.0);
-    let hidden = entries.entries.iter().copied().filter(|entry| !known(entry));
-    entries.untestable.extend(hidden.map(|entry| unseen(&units, entry)));
+    entries.untestable.extend(hidden(&units, &entries.entries, &fit, &pool));
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
     let spread = spread::spread(&units, &fit, &spread_entries, &swaps, count);
@@ -346,6 +342,14 @@ fn paired(units: &[&Unit<'_>], fit: Fit) -> Option<Fit> {
         return Some(fit);
     }
     crate::diagnosis::fit::fit(units, terms, &|_| true, Effort::FULL)
+}
+
+/// The entries that have no candidate, because they change no prediction of what was recorded.
+fn hidden(units: &[&Unit<'_>], entries: &[Entry], fit: &Fit, pool: &Pool) -> Vec<Untestable> {
+    let shows: BTreeSet<Entry> =
+        pool.candidates().map(|candidate| (candidate.term.effect, candidate.term.whose)).collect();
+    let known = |entry: &Entry| shows.contains(entry) || fit.terms.iter().any(|term| term.effect == entry.0);
+    entries.iter().filter(|entry| !known(entry)).map(|&entry| unseen(units, entry)).collect()
 }
 
 /// That nothing is missing is said if, of what was `tried`, more could be tested than could not.
