@@ -1,7 +1,7 @@
 //! Recordings that lack something or are damaged: the diagnosis says what it cannot test and why, claims
 //! nothing of it, tests the rest, and never panics.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail by panicking")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "helpers of tests fail by panicking")]
 
 mod common;
 
@@ -143,7 +143,9 @@ const TABLE: &[Damaged] = &[
         damage: |recording| {
             let truth = &mut own(recording).truth;
             let first = truth[0].pose;
-            truth.iter_mut().for_each(|sample| sample.pose = first);
+            for sample in truth {
+                sample.pose = first;
+            }
         },
         verdict: Verdict::Untestable,
         untestable: &[("lateral_skid", "true poses never change (6000 equal readings)")],
@@ -216,7 +218,9 @@ fn own(recording: &mut Recording) -> &mut RobotRecording {
 /// Repeats the first reading at every stamp.
 fn stick(samples: &mut [Sample]) {
     let first = samples[0].reading;
-    samples.iter_mut().for_each(|sample| sample.reading = first);
+    for sample in samples {
+        sample.reading = first;
+    }
 }
 
 /// Takes away what was recorded from an instant on.

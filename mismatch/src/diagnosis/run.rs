@@ -24,7 +24,7 @@ use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
-use crate::findings::{Estimate, Finding, Findings, HeldOut, Verdict};
+use crate::findings::{Estimate, Finding, Findings, HeldOut, Untestable, Verdict};
 
 /// The spread of a uniform distribution of length one.
 const UNIFORM_SIGMA: f64 = 0.288_675_134_594_812_9;
