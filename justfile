@@ -28,7 +28,8 @@ demo *arguments:
 # The tests on real and simulated recordings.
 recordings:
     cargo test -p pleiad-recording --features recordings --test real
-    cargo test -p pleiad-tests --features recordings --test recordings
+    cargo test -p pleiad-mismatch --features recordings --test recordings
+    cargo test -p pleiad-tests --features recordings --test recordings --test recordings_diagnosis
 
 # Consistency over many seeded runs; takes minutes.
 monte-carlo:

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use pleiad_estimation::RobotId;
 use pleiad_physics::{Channel as Needed, Effect, EffectInfo, Stage};
 
 use crate::channel::Channel;
@@ -18,8 +19,21 @@ pub(crate) struct Entries {
     pub(crate) untestable: Vec<Untestable>,
 }
 
+/// Below this, seconds, there are too few blocks of time for a robust variance.
+pub(crate) const SHORT_S: f64 = 20.0;
+
+/// For how long a robot can be compared in these units together, seconds.
+pub(crate) fn lasting_s(units: &[&Unit<'_>], robot: RobotId) -> f64 {
+    units.iter().filter(|unit| unit.robot == robot).map(|unit| unit.span_s.1 - unit.span_s.0).sum()
+}
+
 /// Sorts the catalogue into what the units allow and what they do not.
 pub(crate) fn entries(units: &[&Unit<'_>]) -> Entries {
+    let obstacle = |effect: Effect, unit: &Unit<'_>| {
+        let lasting_s = lasting_s(units, unit.robot);
+        let short = || format!("{lasting_s:.1} s can be compared, {SHORT_S} s are needed");
+        obstacle(effect, unit).or_else(|| (lasting_s < SHORT_S).then(short))
+    };
     let robots: BTreeSet<_> = units.iter().map(|unit| unit.robot).collect();
     let mut sorted = Entries { entries: Vec::new(), untestable: Vec::new() };
     for &effect in Effect::ALL {
@@ -82,21 +96,31 @@ fn obstacle(effect: Effect, unit: &Unit<'_>) -> Option<String> {
     if Channel::ALL.iter().any(shows) {
         return None;
     }
-    let reasons: Vec<String> = unit
-        .stretches
-        .iter()
-        .filter(|stretch| touches(effect, stretch.channel))
-        .flat_map(|stretch| &stretch.omissions)
-        .map(ToString::to_string)
-        .collect::<BTreeSet<String>>()
-        .into_iter()
-        .collect();
-    let missing = if reasons.is_empty() {
-        "nothing to compare it with was recorded".to_owned()
-    } else {
-        reasons.join("; ")
+    let reasons = omissions(effect, unit);
+    let nothing = || "nothing to compare it with was recorded".to_owned();
+    Some(if reasons.is_empty() { nothing() } else { reasons.join("; ") })
+}
+
+/// What is missing in the channels of an effect.
+fn omissions(effect: Effect, unit: &Unit<'_>) -> Vec<String> {
+    let own = unit.stretches.iter().filter(|stretch| touches(effect, stretch.channel));
+    let reasons: BTreeSet<String> =
+        own.flat_map(|stretch| &stretch.omissions).map(ToString::to_string).collect();
+    reasons.into_iter().collect()
+}
+
+/// An effect that was tried and changes no prediction of what was recorded.
+pub(crate) fn unseen(units: &[&Unit<'_>], (effect, whose): Entry) -> Untestable {
+    let (robot, unit) = match whose {
+        Whose::Robot(robot) => (Some(robot.0), units.iter().find(|unit| unit.robot == robot)),
+        Whose::Everyone => (None, units.first()),
     };
-    Some(missing)
+    let mut why = "it would change nothing of what can be compared".to_owned();
+    let reasons = unit.map_or_else(Vec::new, |unit| omissions(effect, unit));
+    if !reasons.is_empty() {
+        why = format!("{why} ({})", reasons.join("; "));
+    }
+    Untestable { effect: effect.name().to_owned(), robot, why }
 }
 
 /// Whether everything by the robot's clock has an unknown delay of its own: commands, sightings, positions.

@@ -11,6 +11,7 @@ use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::entries::composition;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::held_out::{self, Gain};
+use crate::diagnosis::profile::{Profile, is_on};
 use crate::diagnosis::select::{FAMILYWISE, wald};
 use crate::diagnosis::starts::Placing;
 use crate::diagnosis::support::Support;
@@ -35,6 +36,8 @@ pub(crate) struct Estimated {
     pub(crate) term: Term,
     /// Standard errors in the order of the parameters; `None` for what was not fitted by its derivative.
     pub(crate) errors: Vec<Option<f64>>,
+    /// The 95 % intervals of what has no derivative, by the profile of the likelihood; empty if unknown.
+    pub(crate) profiled: Vec<Option<[f64; 2]>>,
 }
 
 impl Estimated {
@@ -46,7 +49,7 @@ impl Estimated {
             (variance.is_finite() && variance >= 0.0).then(|| variance.sqrt())
         };
         let errors = (0..term.values.len()).map(error).collect();
-        let mut estimated = Self { term, errors };
+        let mut estimated = Self { term, errors, profiled: Vec::new() };
         estimated.make_positive();
         estimated
     }
@@ -69,8 +72,20 @@ impl Estimated {
         }
     }
 
+    /// Finds the intervals of what has no derivative.
+    fn profile(&mut self, profile: &Profile<'_, '_>, position: usize) {
+        let one = |parameter: usize| match self.errors[parameter] {
+            None if is_on(&self.term, parameter) => profile.interval((position, parameter)),
+            _ => None,
+        };
+        self.profiled = (0..self.errors.len()).map(one).collect();
+    }
+
     /// The 95 % interval of a parameter.
     pub(crate) fn interval(&self, parameter: usize) -> Option<[f64; 2]> {
+        if let Some(Some(profiled)) = self.profiled.get(parameter) {
+            return Some(*profiled);
+        }
         let error = self.errors[parameter]?;
         let value = self.term.values[parameter];
         Some([value - Z_95 * error, value + Z_95 * error])
@@ -130,7 +145,7 @@ pub(crate) struct Judged {
 /// no use on data that it was not fitted on.
 pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: usize) -> Judged {
     let (fit, covariance, group) = (&support.with, &support.covariance, &support.group);
-    let estimated: Vec<Estimated> =
+    let mut estimated: Vec<Estimated> =
         group.iter().map(|&position| Estimated::of(fit, covariance, position)).collect();
     let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
     let parameters = estimated.iter().flat_map(|own| own.errors.iter().flatten()).count().max(1);
@@ -164,6 +179,12 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
     });
     let place = place(&acting, support, &main.term);
     let channel = channel(&acting, support);
+    if verdict.is_some() {
+        let profile = Profile::new(&acting, fit);
+        for (own, &position) in estimated.iter_mut().zip(group) {
+            own.profile(&profile, position);
+        }
+    }
     Judged { estimated, total, verdict, p_familywise, channel, place, one_off }
 }
 

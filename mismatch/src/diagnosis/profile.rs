@@ -125,13 +125,36 @@ fn steps(term: &Term, parameter: usize) -> (f64, f64) {
     (THRESHOLD_STEPS.0 * size, THRESHOLD_STEPS.1 * size)
 }
 
+/// Whether a parameter is a size from which an effect begins to act: without derivative, and no place or onset.
+pub(crate) fn is_threshold(term: &Term, parameter: usize) -> bool {
+    term.parameters()[parameter].fit == How::Grid && !is_placed(term, parameter)
+}
+
+fn is_placed(term: &Term, parameter: usize) -> bool {
+    let placing = Placing::of(term.effect.info());
+    placing.onset == Some(parameter)
+        || placing.region.is_some_and(|first| (first..first + 4).contains(&parameter))
+}
+
 /// Moves parameters without derivative to where the likelihood is greatest, and fits the others again.
-pub(crate) fn polish(units: &[&Unit<'_>], mut current: Fit) -> Fit {
+pub(crate) fn polish(units: &[&Unit<'_>], current: Fit) -> Fit {
+    polish_some(units, current, &|_, _| true, &|_| true, Effort::FULL)
+}
+
+/// The same for those parameters of terms for which `chosen` holds; of the others those of terms for which
+/// `movable` holds are fitted again.
+pub(crate) fn polish_some(
+    units: &[&Unit<'_>],
+    mut current: Fit,
+    chosen: &dyn Fn(&Fit, Slot) -> bool,
+    movable: &dyn Fn(usize) -> bool,
+    effort: Effort,
+) -> Fit {
     let loose: Vec<Slot> = (0..current.terms.len())
         .flat_map(|term| (0..current.terms[term].values.len()).map(move |parameter| (term, parameter)))
         .filter(|slot| {
             let parameter: &Parameter = &current.terms[slot.0].parameters()[slot.1];
-            parameter.fit == How::Grid && !current.slots.contains(slot)
+            parameter.fit == How::Grid && !current.slots.contains(slot) && chosen(&current, *slot)
         })
         .collect();
     if loose.is_empty() {
@@ -140,10 +163,9 @@ pub(crate) fn polish(units: &[&Unit<'_>], mut current: Fit) -> Fit {
     for _ in 0..2 {
         for &slot in &loose {
             let value = best(&Profile::new(units, &current), slot);
-            current.terms[slot.0].values[slot.1] = value;
             let mut terms = current.terms.clone();
             terms[slot.0].values[slot.1] = value;
-            match fit(units, terms, &|_| true, Effort::FULL) {
+            match fit(units, terms, movable, effort) {
                 Some(next) => current = next,
                 None => return current,
             }
@@ -152,17 +174,20 @@ pub(crate) fn polish(units: &[&Unit<'_>], mut current: Fit) -> Fit {
     current
 }
 
+/// Whether a parameter was moved away from "off".
+#[allow(clippy::float_cmp, reason = "the off value itself")]
+pub(crate) fn is_on(term: &Term, parameter: usize) -> bool {
+    term.values[parameter] != term.parameters()[parameter].off
+}
+
 /// The value of greatest likelihood: for a threshold the best of a grid, then by halving steps.
 fn best(profile: &Profile<'_, '_>, slot: Slot) -> f64 {
     let term = &profile.fit.terms[slot.0];
     let parameter = &term.parameters()[slot.1];
-    let placing = Placing::of(term.effect.info());
-    let placed = placing.onset == Some(slot.1)
-        || placing.region.is_some_and(|first| (first..first + 4).contains(&slot.1));
     let at = |value: f64| profile.at(slot, value).unwrap_or(f64::NEG_INFINITY);
     let mut value = term.values[slot.1];
     let mut most = at(value);
-    if !placed {
+    if is_threshold(term, slot.1) {
         for other in thresholds(parameter, profile.units) {
             let there = at(other);
             if there > most {

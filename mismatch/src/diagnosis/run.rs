@@ -9,7 +9,7 @@ use pleiad_recording::Recording;
 use crate::builtin;
 use crate::diagnose::{DiagnoseOptions, Diagnosis, TruthUse};
 use crate::diagnosis::corrected;
-use crate::diagnosis::entries::{Entries, entries};
+use crate::diagnosis::entries::{Entries, SHORT_S, entries, lasting_s, unseen};
 use crate::diagnosis::fit::{Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
 use crate::diagnosis::lag::paired;
@@ -17,7 +17,7 @@ use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, judge};
 use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
-use crate::diagnosis::select::{Pool, Selected, select};
+use crate::diagnosis::select::{Entry, Pool, Selected, select};
 use crate::diagnosis::series;
 use crate::diagnosis::spread::{self, SpreadTerm};
 use crate::diagnosis::support::{Support, support};
@@ -25,7 +25,7 @@ use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
-use crate::findings::{Estimate, Finding, Findings, HeldOut, Verdict};
+use crate::findings::{Estimate, Finding, Findings, HeldOut, Untestable, Verdict};
 
 /// The spread of a uniform distribution of length one.
 const UNIFORM_SIGMA: f64 = 0.288_675_134_594_812_9;
@@ -66,15 +66,17 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         .map(|(index, own, robot, model)| unit(index, own, robot, model))
         .collect();
     let swaps = spread::swaps(&mut all);
+    let fitted: Vec<&Unit<'_>> = all.iter().filter(|unit| !prepared[unit.recording].tested).collect();
+    let enough = |unit: &&Unit<'_>| lasting_s(&fitted, unit.robot) >= SHORT_S;
     let units: Vec<&Unit<'_>> =
-        all.iter().filter(|unit| !prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
+        fitted.iter().copied().filter(|unit| !unit.rows.is_empty()).filter(enough).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
-    let mut entries =
-        entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let mut entries = entries(&fitted);
+    let tried = entries.entries.len() + entries.untestable.len();
     let spread_entries = spread::take(&mut entries, &units);
 
-    let mut notes = notes(&prepared, &all);
+    let mut notes = notes(&prepared, &all, &fitted);
     let selected = select(&units, &entries.entries);
     let Some(Selected { fit, tests: count, mut pool }) = selected else {
         return Ok(nothing(&prepared, entries, notes, units.is_empty()));
@@ -84,6 +86,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     };
     let count = count + spread_entries.len() + swaps.tests;
     let scored = pool.scored(&units, &entries.entries, &fit);
+    entries.untestable.extend(hidden(&units, &entries.entries, &fit, &pool));
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
     let spread = spread::spread(&units, &fit, &spread_entries, &swaps, count);
@@ -129,7 +132,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         prepared.iter().filter(|own| own.tested == tested).map(|own| own.recording.name.clone()).collect()
     };
     let findings = Findings {
-        verdict: overall(&findings, &units),
+        verdict: overall(&findings, tried, entries.untestable.len()),
         recordings: recordings.iter().map(|recording| recording.name.clone()).collect(),
         fit_on: names(false),
         test_on: names(true),
@@ -185,7 +188,7 @@ pub(crate) fn unit<'a>(
 }
 
 /// What could not be compared at all.
-fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
+fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>], fitted: &[&Unit<'_>]) -> Vec<String> {
     let mut notes = Vec::new();
     for unit in units {
         let name = &prepared[unit.recording].recording.name;
@@ -195,22 +198,25 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
                 notes.push(format!("{name}, robot {}, {}: {omission}", unit.robot, stretch.channel));
             }
         }
-        let (first_s, last_s) = unit.span_s;
-        if !unit.rows.is_empty() && last_s - first_s < SHORT_S {
+    }
+    let mut robots: Vec<RobotId> = fitted.iter().map(|unit| unit.robot).collect();
+    robots.sort_unstable();
+    robots.dedup();
+    for (robot, lasting_s) in robots.into_iter().map(|robot| (robot, lasting_s(fitted, robot))) {
+        if lasting_s < SHORT_S {
             notes.push(format!(
-                "{name}, robot {}: {:.1} s can be compared; below {SHORT_S} s nothing is named",
-                unit.robot,
-                last_s - first_s
+                "robot {robot}: {lasting_s:.1} s can be compared; below {SHORT_S} s nothing is"
             ));
         }
+    }
+    for own in prepared.iter().filter(|own| own.models.is_empty()) {
+        notes.push(format!("{}: no robot recorded anything", own.recording.name));
     }
     notes
 }
 
 /// What one row in so many lacks is not worth a note.
 const FEW: usize = 20;
-/// Below this, seconds, there are too few blocks of time for a robust variance.
-pub(crate) const SHORT_S: f64 = 20.0;
 
 fn judgements(
     units: &[&Unit<'_>],
@@ -322,13 +328,21 @@ fn kept(fit: &Fit, judgements: &[Judgement]) -> Vec<Term> {
     found.flat_map(|own| own.group.iter().map(|&term| fit.terms[term].clone())).collect()
 }
 
-fn overall(findings: &[Finding], units: &[&Unit<'_>]) -> Verdict {
+/// The entries that have no candidate, because they change no prediction of what was recorded.
+fn hidden(units: &[&Unit<'_>], entries: &[Entry], fit: &Fit, pool: &Pool) -> Vec<Untestable> {
+    let shows: BTreeSet<Entry> =
+        pool.candidates().map(|candidate| (candidate.term.effect, candidate.term.whose)).collect();
+    let known = |entry: &Entry| shows.contains(entry) || fit.terms.iter().any(|term| term.effect == entry.0);
+    entries.iter().filter(|entry| !known(entry)).map(|&entry| unseen(units, entry)).collect()
+}
+
+/// That nothing is missing is said if, of what was `tried`, more could be tested than could not.
+fn overall(findings: &[Finding], tried: usize, untestable: usize) -> Verdict {
     let order = [Verdict::Named, Verdict::BadData, Verdict::CannotTell, Verdict::Unnameable];
-    let tested = units.iter().any(|unit| unit.span_s.1 - unit.span_s.0 >= SHORT_S);
     order
         .into_iter()
         .find(|verdict| findings.iter().any(|finding| finding.verdict == *verdict))
-        .unwrap_or(if tested { Verdict::NothingMissing } else { Verdict::Untestable })
+        .unwrap_or(if tried > 2 * untestable { Verdict::NothingMissing } else { Verdict::Untestable })
 }
 
 /// What is said where nothing could be compared.

@@ -9,6 +9,7 @@ use crate::diagnosis::candidate::{Candidate, candidates};
 use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::fit::{Effort, Fit, Slot, State, fit, fit_from, with_another};
 use crate::diagnosis::parallel;
+use crate::diagnosis::profile::{is_on, is_threshold, polish_some};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Column, Unit};
@@ -312,7 +313,14 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
         terms.iter().map(|term| whose == Whose::Everyone || term.whose == whose).collect();
     let known: Vec<State> = own.iter().map(|&unit| current.states[unit].clone()).collect();
     let states = with_another(&acting, &known, &terms)?;
-    Some(fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL))
+    let movable = |index: usize| movable[index];
+    let fitted = fit_from(&acting, terms, states, &movable, Effort::RIVAL);
+    let added = fitted.terms.len() - 1;
+    let threshold = |fit: &Fit, (term, parameter): Slot| {
+        let own = &fit.terms[term];
+        term == added && is_threshold(own, parameter) && is_on(own, parameter)
+    };
+    Some(polish_some(&acting, fitted, &threshold, &movable, Effort::RIVAL))
 }
 
 /// What a fit with one more term gains by Bayes' information criterion on the effective sample size; more is

@@ -6,9 +6,10 @@ use nalgebra::DMatrix;
 use pleiad_physics::Effect;
 
 use crate::diagnosis::candidate::Candidate;
-use crate::diagnosis::fit::{Effort, Fit, fit};
+use crate::diagnosis::fit::{Effort, Fit, Slot, fit};
 use crate::diagnosis::naming::{Estimated, is_unseen, twin};
 use crate::diagnosis::parallel;
+use crate::diagnosis::profile::{is_on, polish_some};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::select::{Pool, Scored, covariance, fit_beside, overlap, score, whites};
 use crate::diagnosis::term::Term;
@@ -60,19 +61,24 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &P
     let with = {
         let mut terms = others.clone();
         terms.extend(group.iter().map(|&term| full.terms[term].clone()));
-        let movable: Vec<bool> = terms.iter().map(|term| term.whose == chosen.whose).collect();
-        fit(&acting, terms, &|index| movable[index], Effort::RIVAL)?
+        fit(&acting, terms, &|index| index >= count || movable[index], Effort::RIVAL)?
     };
     let positions: Vec<usize> = (count..with.terms.len()).collect();
-    let covariance = covariance(&acting, &with)?;
-    let relevant = positions.iter().any(|&position| {
-        let estimated = Estimated::of(&with, &covariance, position);
-        acting.iter().any(|unit| estimated.may_be_relevant(unit))
-    });
+    let relevant = {
+        let covariance = covariance(&acting, &with)?;
+        positions.iter().any(|&position| {
+            let estimated = Estimated::of(&with, &covariance, position);
+            acting.iter().any(|unit| estimated.may_be_relevant(unit))
+        })
+    };
     // What is too small to matter needs no rivals.
     if !relevant {
         return None;
     }
+    let searched = |fit: &Fit, (term, parameter): Slot| term >= count && is_on(&fit.terms[term], parameter);
+    let with =
+        polish_some(&acting, with, &searched, &|index| index >= count || movable[index], Effort::RIVAL);
+    let covariance = covariance(&acting, &with)?;
     let without = fit(&acting, others, &|index| movable[index], Effort::RIVAL)?;
 
     let whites = whites(&acting, &without);

@@ -24,7 +24,7 @@ pub(super) fn judged(family: &Family<'_, '_>, shows: &Shows, robot: RobotId, tes
     for (free, shown) in term.free.iter_mut().zip(&member.shown) {
         *free = !matches!(shown, Shown::Fixed(_));
     }
-    let estimated = Estimated { term, errors };
+    let estimated = Estimated { term, errors, profiled: Vec::new() };
     let relevant = is_relevant(family, member, &estimated, &shows.with, &shows.known);
     let mut support = vec![member.effect];
     support.extend(&shows.rivals);

@@ -73,6 +73,7 @@ pub(super) fn coarse(units: &[&Unit<'_>], robot: RobotId, tests: usize) -> Optio
     let estimated = Estimated {
         term: Term::new(Effect::EncoderCoarse, Whose::Robot(robot), vec![ticks]),
         errors: vec![Some(error(&changes, tick_rad).max(LEAST_ERROR) * ticks)],
+        profiled: Vec::new(),
     };
     let channel = if units.iter().any(|unit| unit.stretch(Channel::Actuator).is_some()) {
         Channel::Actuator
