@@ -234,8 +234,8 @@ fn additions(
     parallel::map(&groups, |rivals| choose(units, whites, current, rivals)).into_iter().flatten().collect()
 }
 
-/// Fits the strongest rivals and gives the best of them, fitted. Where none of these keeps what its
-/// linearization promised (a few wild readings promise much), the next strongest have their turn.
+/// Fits the strongest rivals and gives the best of them, fitted. Where none of these gains anything once it is
+/// fitted (a few wild readings promise much by linearization), the next strongest have their turn.
 fn choose(units: &[&Unit<'_>], whites: &[White<'_, '_>], current: &Fit, rivals: &[&Scored]) -> Option<Fit> {
     let mut rest = rivals;
     while let Some(first) = rest.first() {
@@ -245,12 +245,13 @@ fn choose(units: &[&Unit<'_>], whites: &[White<'_, '_>], current: &Fit, rivals: 
         let fitted: Vec<Option<(f64, Fit)>> = parallel::map(tried, |rival| {
             let rival = refine(units, whites, rival);
             let added = fit_beside(units, current, rival.term())?;
-            added.terms.last()?.is_inside().then(|| (criterion(units, current, &added, inflation), added))
+            let kept = added.terms.last()?.is_inside() && gained(units, current, &added).1 > LEAST_GAIN;
+            kept.then(|| (criterion(units, current, &added, inflation), added))
         });
         // Of equals the first: the one whose linearization was the strongest.
         let mut best: Option<(f64, Fit)> = None;
         for (value, fit) in fitted.into_iter().flatten() {
-            if value > best.as_ref().map_or(0.0, |(most, _)| *most) {
+            if best.as_ref().is_none_or(|(most, _)| value > *most) {
                 best = Some((value, fit));
             }
         }
@@ -326,14 +327,20 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
 /// What a fit with one more term gains by Bayes' information criterion on the effective sample size; more is
 /// better. Rivals may act on other robots.
 fn criterion(units: &[&Unit<'_>], current: &Fit, added: &Fit, inflation: f64) -> f64 {
-    let Some(term) = added.terms.last() else { return f64::NEG_INFINITY };
+    let (rows, gain) = gained(units, current, added);
+    let effective = (rows as f64 / inflation).max(2.0);
+    gain / inflation - added.parameters_of_last() as f64 * effective.ln()
+}
+
+/// The rows of the units that the last term of a fit acts on, and what it gains there, twice in log-likelihood.
+fn gained(units: &[&Unit<'_>], current: &Fit, added: &Fit) -> (usize, f64) {
+    let Some(term) = added.terms.last() else { return (0, 0.0) };
     let (mut rows, mut before) = (0, 0.0);
     for (unit, state) in units.iter().zip(&current.states).filter(|(unit, _)| term.acts_on(unit.robot)) {
         rows += unit.rows.len();
         before += state.noise.log_likelihood;
     }
-    let effective = (rows as f64 / inflation).max(2.0);
-    2.0 * (added.log_likelihood - before) / inflation - added.parameters_of_last() as f64 * effective.ln()
+    (rows, 2.0 * (added.log_likelihood - before))
 }
 
 /// The robust covariance of all fitted parameters, in the order of the slots.
