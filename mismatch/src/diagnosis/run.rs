@@ -82,7 +82,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         covariance(&units, &fit).unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
     let pool = Pool::default().scored(&units, &entries.entries, &fit);
     let mut judgements = judgements(&units, &tests, &fit, &covariance, &pool, count);
-    let spread = spread::spread(&units, &fit, &spread_entries, &swaps, count);
+    let spread = spread::spread(&units, &tests, &fit, &spread_entries, &swaps, count);
     spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 

@@ -70,13 +70,24 @@ impl Uncertainty {
         Some([part(&self.covariance), part(&self.naive)])
     }
 
+    /// The error of one of some parameters if the others of them are known.
+    pub(super) fn alone(&self, which: &[usize], one: usize) -> Option<f64> {
+        let [robust, _] = self.parts(which)?;
+        let position = which.iter().position(|own| *own == one)?;
+        let information = robust.cholesky()?.inverse()[(position, position)];
+        (information > 0.0).then(|| 1.0 / information.sqrt())
+    }
+
     /// How much more the scores of some parameters vary than if rows were independent; at least 1.
     pub(super) fn inflation(&self, which: &[usize]) -> f64 {
         let inflated = |[robust, naive]: [DMatrix<f64>; 2]| {
             let solved = naive.cholesky()?.solve(&robust);
             Some(solved.trace() / which.len().max(1) as f64)
         };
-        self.parts(which).and_then(inflated).filter(|value| value.is_finite()).map_or(1.0, |value| value.max(1.0))
+        self.parts(which)
+            .and_then(inflated)
+            .filter(|value| value.is_finite())
+            .map_or(1.0, |value| value.max(1.0))
     }
 
     /// The Wald statistic of a departure of some parameters.

@@ -198,4 +198,3 @@ fn instants<'s, 'a>(unit: &Unit<'_>, own: &'s [Scan<'a>]) -> Vec<(f64, Option<&'
     }
     found
 }
-

@@ -30,7 +30,8 @@ impl Spread {
 
     /// Those with a verdict, the largest gain first.
     pub(crate) fn found(&self) -> Vec<&SpreadTerm> {
-        let mut found: Vec<&SpreadTerm> = self.terms.iter().filter(|own| own.judged.verdict.is_some()).collect();
+        let mut found: Vec<&SpreadTerm> =
+            self.terms.iter().filter(|own| own.judged.verdict.is_some()).collect();
         found.sort_by(|a, b| b.gain.total.total_cmp(&a.gain.total));
         found
     }

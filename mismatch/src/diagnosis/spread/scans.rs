@@ -84,7 +84,8 @@ fn is_same(range: &Sighted, bearing: &Sighted) -> bool {
 pub(super) fn targets(unit: &Unit<'_>, kind: usize, time_s: f64) -> Vec<(Target, Seen)> {
     let evidence = unit.evidence;
     if kind == 0 {
-        let landmark = |(&id, place): (&LandmarkId, &[f64; 2])| (Target::Landmark(id), Seen::landmark(id.0, *place));
+        let landmark =
+            |(&id, place): (&LandmarkId, &[f64; 2])| (Target::Landmark(id), Seen::landmark(id.0, *place));
         return evidence.recording.landmarks.iter().map(landmark).collect();
     }
     let others = evidence.tracks.keys().filter(|robot| **robot != unit.robot);

@@ -66,6 +66,14 @@ impl Sightings {
     }
 }
 
+/// Of the errors of a range and a bearing, where they are there.
+fn log_density(errors: &[Option<f64>; 2], sigmas: [f64; 2], student: Student) -> f64 {
+    let part = |(error, sigma): (&Option<f64>, f64)| {
+        error.map_or(0.0, |error| student.log_density(error / sigma, sigma))
+    };
+    errors.iter().zip(sigmas).map(part).sum()
+}
+
 impl Density for Sightings {
     fn rows(&self) -> usize {
         self.rows.len()
@@ -81,15 +89,10 @@ impl Density for Sightings {
         let (own, other) = (libm::log1p(-mixed), libm::log(mixed));
         for (row, value) in self.rows.iter().zip(into) {
             let sigmas = Self::sigmas(row, parameters);
-            let of = |errors: &[Option<f64>; 2]| -> f64 {
-                let part = |(error, sigma): (&Option<f64>, &f64)| {
-                    error.map_or(0.0, |error| student.log_density(error / sigma, *sigma))
-                };
-                errors.iter().zip(&sigmas).map(part).sum()
-            };
-            *value = of(&row.errors);
+            *value = log_density(&row.errors, sigmas, student);
             if row.choices > 0 && mixed > 0.0 {
-                let others = row.others.iter().map(of).fold(f64::NEG_INFINITY, log_sum);
+                let others = row.others.iter().map(|errors| log_density(errors, sigmas, student));
+                let others = others.fold(f64::NEG_INFINITY, log_sum);
                 *value = log_sum(own + *value, other + others - libm::log(row.choices as f64));
             }
         }

@@ -61,12 +61,18 @@ pub(crate) fn swaps(units: &mut [Unit<'_>]) -> Swaps {
             continue;
         }
         all.robots.push(robot);
-        let names: Vec<u32> = gains.keys().map(|(named, _)| *named).collect::<std::collections::BTreeSet<_>>().into_iter().collect();
+        let names: Vec<u32> = gains
+            .keys()
+            .map(|(named, _)| *named)
+            .collect::<std::collections::BTreeSet<_>>()
+            .into_iter()
+            .collect();
         all.tests += names.len() * names.len().saturating_sub(1) / 2;
         let mut found = Vec::new();
         for (index, &first) in names.iter().enumerate() {
             for &second in &names[index + 1..] {
-                let (Some(one), Some(other)) = (gains.get(&(first, second)), gains.get(&(second, first))) else {
+                let (Some(one), Some(other)) = (gains.get(&(first, second)), gains.get(&(second, first)))
+                else {
                     continue;
                 };
                 let sum = |blocks: &Vec<Vec<f64>>| blocks.iter().flatten().sum::<f64>();
@@ -156,9 +162,8 @@ fn gains(units: &[&Unit<'_>]) -> BTreeMap<(u32, u32), Vec<Vec<f64>>> {
     for (position, unit) in units.iter().enumerate() {
         let model = &unit.nominal;
         let declared = [model.nominal.range_sigma_m, model.nominal.bearing_sigma_rad];
-        let sigmas = [0, 1].map(|part: usize| {
-            SLACK * if declared[part] > 0.0 { declared[part] } else { UNDECLARED[part] }
-        });
+        let sigmas = [0, 1]
+            .map(|part: usize| SLACK * if declared[part] > 0.0 { declared[part] } else { UNDECLARED[part] });
         let penalty = |errors: [Option<f64>; 2]| -> f64 {
             let part = |(error, sigma): (Option<f64>, f64)| {
                 error.map_or(0.0, |error| 0.5 * (error / sigma).abs().min(CLIP).powi(2))

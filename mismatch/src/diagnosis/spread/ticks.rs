@@ -74,10 +74,14 @@ pub(super) fn coarse(units: &[&Unit<'_>], robot: RobotId, tests: usize) -> Optio
         term: Term::new(Effect::EncoderCoarse, Whose::Robot(robot), vec![ticks]),
         errors: vec![Some(error(&changes, tick_rad).max(LEAST_ERROR) * ticks)],
     };
-    let channel =
-        if units.iter().any(|unit| unit.stretch(Channel::Actuator).is_some()) { Channel::Actuator } else { Channel::Body };
+    let channel = if units.iter().any(|unit| unit.stretch(Channel::Actuator).is_some()) {
+        Channel::Actuator
+    } else {
+        Channel::Body
+    };
     let verdict = named.then_some(Verdict::Named);
-    let judged = Judged { estimated, verdict, p_familywise, channel, place: Place::default(), one_off: false };
+    let judged =
+        Judged { estimated, verdict, p_familywise, channel, place: Place::default(), one_off: false };
     Some(SpreadTerm { judged, gain, robots: vec![robot], support: vec![Effect::EncoderCoarse] })
 }
 

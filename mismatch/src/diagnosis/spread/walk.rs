@@ -50,9 +50,10 @@ impl Density for Readings {
         let constant_s = libm::exp(parameters[TIME]);
         let (mut bias, mut variance) = (0.0, 0.0);
         for ((step_s, age_s, residual), value) in self.rows.iter().zip(into) {
-            match step_s {
-                Some(step_s) => variance += parameters[WALK] * step_s,
-                None => (bias, variance) = (parameters[FIRST], parameters[UNKNOWN]),
+            if let Some(step_s) = step_s {
+                variance += parameters[WALK] * step_s;
+            } else {
+                (bias, variance) = (parameters[FIRST], parameters[UNKNOWN]);
             }
             let warm = parameters[WARM] * -libm::expm1(-age_s / constant_s);
             let sigma = (variance + white).sqrt();
