@@ -34,6 +34,10 @@ recordings:
 monte-carlo:
     cargo test -p pleiad-tests --features slow --test monte_carlo
 
+# How well each effect of the catalogue is estimated: the table of docs/benchmarks/effects.md. Takes minutes.
+effects *arguments:
+    cargo run -p pleiad-tests --example effects -- --out docs/benchmarks/effects.md {{ arguments }}
+
 # The documentation of the workspace's own crates, warnings denied.
 docs:
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps

@@ -1,5 +1,7 @@
 //! The true motion against the roll-out of the encoders.
 
+use std::ops::Range;
+
 use pleiad_estimation::RobotId;
 use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::predict::{BodyWindow, truth_change};
@@ -23,10 +25,14 @@ pub(crate) struct Motion {
     pub(crate) joined: bool,
     pub(crate) middle_s: f64,
     pub(crate) regime: Regime,
+    /// The encoder samples along which truth is carried.
+    reach: Range<usize>,
+    /// The stamps of the reference poses nearest to its ends, seconds.
+    stamps_s: [f64; 2],
     /// The true pose at the beginning.
     pub(crate) start: Pose<f64>,
     pub(crate) surroundings: Surroundings,
-    /// The true pose at the end, seen from the start.
+    /// The last of those reference poses, seen from the first.
     pub(crate) measured: Pose<f64>,
 }
 
@@ -41,9 +47,13 @@ impl Motion {
         if !self.joined {
             *state = BodyState::default();
         }
-        let samples = &track.encoders[self.window.first..=self.window.last];
-        let window = BodyWindow { samples, start: self.start, surroundings: self.surroundings };
-        truth_change(model, &window, state)
+        let window = BodyWindow {
+            track: &track.encoders[self.reach.clone()],
+            ends: [self.window.first, self.window.last].map(|end| end - self.reach.start),
+            start: self.start,
+            surroundings: self.surroundings,
+        };
+        truth_change(model, &window, self.stamps_s, state)
     }
 }
 
@@ -66,9 +76,9 @@ pub(crate) fn plan_of_length(evidence: &Evidence<'_>, robot: RobotId, length_s: 
     let mut joined = None;
     for window in found {
         let [from_s, to_s] = [window.first, window.last].map(|index| track.encoders[index].time_s);
-        let ends = track.truth_at(from_s).zip(track.truth_at(to_s));
+        let ends = track.truth_near(from_s).zip(track.truth_near(to_s)).zip(track.truth_at(from_s));
         let middle_s = f64::midpoint(from_s, to_s);
-        let (Some((start, end)), Some(regime)) = (ends, track.regime_at(middle_s)) else {
+        let (Some(((first, last), start)), Some(regime)) = (ends, track.regime_at(middle_s)) else {
             plan.count(|count| Omission::NoTruth(robot, count));
             continue;
         };
@@ -77,9 +87,11 @@ pub(crate) fn plan_of_length(evidence: &Evidence<'_>, robot: RobotId, length_s: 
             joined: joined == Some(window.first),
             middle_s,
             regime,
+            reach: track.reach(&window),
+            stamps_s: [first.0, last.0],
             start,
             surroundings: evidence.surroundings(robot, middle_s, Some(start.position())),
-            measured: start.between(&end),
+            measured: first.1.between(&last.1),
         });
         joined = Some(window.last);
     }

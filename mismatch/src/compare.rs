@@ -35,6 +35,7 @@ pub fn residuals_of<S: Scalar>(
         return ChannelResiduals::without(channel, Omission::NotRecorded("robot"));
     };
     let [to_landmark, of_landmark, to_robot, of_robot] = &plans.sightings;
+    let seen = |part, plan| sightings::residuals(evidence, (channel, part), (track, plan), model);
     match channel {
         Channel::Actuator => actuator::residuals(track, &plans.actuator, model),
         Channel::Body => body::residuals(track, &plans.body, model),
@@ -43,12 +44,12 @@ pub fn residuals_of<S: Scalar>(
         }
         Channel::CommandedBody => commanded::residuals(track, &plans.commanded, model),
         Channel::Gyro => gyro::residuals(&plans.gyro, model),
-        Channel::Gps => sensors::gps(&plans.gps, model),
-        Channel::Heading => sensors::heading(&plans.heading, model),
-        Channel::RangeToLandmark => sightings::residuals(channel, Part::Range, to_landmark, model, evidence),
-        Channel::BearingToLandmark => sightings::residuals(channel, Part::Bearing, of_landmark, model, evidence),
-        Channel::RangeToRobot => sightings::residuals(channel, Part::Range, to_robot, model, evidence),
-        Channel::BearingToRobot => sightings::residuals(channel, Part::Bearing, of_robot, model, evidence),
+        Channel::Gps => sensors::gps(track, &plans.gps, model),
+        Channel::Heading => sensors::heading(track, &plans.heading, model),
+        Channel::RangeToLandmark => seen(Part::Range, to_landmark),
+        Channel::BearingToLandmark => seen(Part::Bearing, of_landmark),
+        Channel::RangeToRobot => seen(Part::Range, to_robot),
+        Channel::BearingToRobot => seen(Part::Bearing, of_robot),
     }
 }
 

@@ -4,7 +4,7 @@ use pleiad_estimation::RobotId;
 use pleiad_estimation::sample::Reading;
 use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::chain::sensors;
-use pleiad_physics::predict::{BodyWindow, EncoderSample, mean_gyro};
+use pleiad_physics::predict::{BodyWindow, EncoderSample, body_motion, mean_gyro};
 use pleiad_physics::{Context, Motion, Pose, RobotModel, Scalar, Surroundings};
 
 use crate::channel::Channel;
@@ -24,6 +24,8 @@ pub(crate) struct Stretch {
     /// Since the first reading of all, seconds.
     age_s: f64,
     regime: Regime,
+    /// The wheels since the window before ended, if they are known: the body's state goes on.
+    before: Option<Vec<EncoderSample>>,
     /// The wheels over the same time.
     wheels: Vec<EncoderSample>,
     start: Pose<f64>,
@@ -57,6 +59,8 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Stretch> {
         .collect();
     let mut plan = Plan::new();
     let mut rest = readings.as_slice();
+    // Where the window before ended.
+    let mut ended_s = None;
     while let Some(&(start_s, _)) = rest.first() {
         let length = rest.partition_point(|(time_s, _)| *time_s < start_s + WINDOW_S);
         let (window, later) = rest.split_at(length);
@@ -72,10 +76,13 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Stretch> {
             continue;
         };
         let start = track.truth_at(start_s);
+        let before = ended_s.and_then(|ended_s| stretch(track, ended_s, start_s));
+        ended_s = Some(end_s);
         plan.items.push(Stretch {
             middle_s,
             age_s: middle_s - readings[0].0,
             regime,
+            before,
             wheels,
             start: start.unwrap_or(Pose::identity()),
             surroundings: evidence.surroundings(robot, middle_s, start.map(|pose| pose.position())),
@@ -89,9 +96,16 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Stretch> {
 /// Mean of the gyro over a window minus what it would read at the yaw rate of the encoders.
 pub(crate) fn residuals<S: Scalar>(plan: &Plan<Stretch>, model: &RobotModel<S>) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(Channel::Gyro, plan);
+    let mut state = BodyState::default();
     for own in &plan.items {
-        let window = BodyWindow { samples: &own.wheels, start: own.start, surroundings: own.surroundings };
-        let predicted = mean_gyro(model, &window, &mut BodyState::default());
+        let window = |samples| BodyWindow::whole(samples, own.start, own.surroundings);
+        match &own.before {
+            Some(before) => {
+                body_motion(model, &window(before), &mut state);
+            }
+            None => state = BodyState::default(),
+        }
+        let predicted = mean_gyro(model, &window(&own.wheels), &mut state);
         let sigma = sigma(model, own);
         channel.push(Residual::new(own.middle_s, own.regime, None, &[-predicted + own.measured], &[sigma]));
     }

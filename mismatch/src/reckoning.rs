@@ -1,6 +1,7 @@
 //! Dead reckoning by one robot's odometry, asked for any instant.
 
-use pleiad_physics::Pose;
+use pleiad_physics::predict::Path;
+use pleiad_physics::{Motion, Pose};
 
 /// One sample of odometry.
 #[derive(Clone, Copy, Debug)]
@@ -63,6 +64,22 @@ impl Reckoning {
         }
         let step_s = self.times_s.get(after)? - step.time_s;
         (step_s <= self.pause_s).then(|| advanced(reckoned, step, since_s / step_s))
+    }
+}
+
+impl Path for Reckoning {
+    /// Between samples the velocity is constant.
+    fn motion_at(&self, time_s: f64) -> Option<Motion<f64>> {
+        let after = self.times_s.partition_point(|stamp_s| *stamp_s <= time_s);
+        let (step, reckoned) = self.steps.get(after.checked_sub(1)?)?;
+        let step_s = self.times_s.get(after)? - step.time_s;
+        if step_s > self.pause_s {
+            return None;
+        }
+        let mut motion = Motion::at_rest(advanced(reckoned, step, (time_s - step.time_s) / step_s).pose);
+        motion.speed_m_s = step.forward_m / step_s;
+        motion.yaw_rate_rad_s = step.yaw_rad / step_s;
+        Some(motion)
     }
 }
 

@@ -123,6 +123,23 @@ pub enum Omission {
     TooFew(usize, usize),
 }
 
+impl Omission {
+    /// Whether it says more than that a few rows, at most so many, are missing.
+    pub(crate) fn matters(&self, few: usize) -> bool {
+        match self {
+            Self::ByStages => false,
+            Self::NoWheels(_, count)
+            | Self::NoTruth(_, count)
+            | Self::NotInMap(count)
+            | Self::NoCommand(count)
+            | Self::CommandGap(count)
+            | Self::SparseWindow(count)
+            | Self::NotFinite(count) => *count > few,
+            Self::NotRecorded(_) | Self::Constant(..) | Self::TooFew(..) => true,
+        }
+    }
+}
+
 impl fmt::Display for Omission {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

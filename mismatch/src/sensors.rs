@@ -2,8 +2,8 @@
 
 use pleiad_estimation::RobotId;
 use pleiad_estimation::sample::{Reading, Sample};
-use pleiad_physics::predict::{self, Instant};
-use pleiad_physics::{Pose, RobotModel, Scalar};
+use pleiad_physics::predict::{self, Anchor, Instant, Path};
+use pleiad_physics::{Motion, Pose, RobotModel, Scalar, Surroundings};
 
 use crate::channel::Channel;
 use crate::evidence::{Evidence, is_constant};
@@ -26,9 +26,15 @@ pub(crate) struct Heading {
 /// The instant of a reading, and the truth then.
 #[derive(Clone)]
 pub(crate) struct At {
-    pub(crate) instant: Instant,
+    pub(crate) time_s: f64,
+    pub(crate) motion: Motion<f64>,
+    surroundings: Surroundings,
     pub(crate) regime: Regime,
     pub(crate) pose: Pose<f64>,
+    /// The reference pose that `pose` was carried from, and its stamp.
+    reference: (f64, Pose<f64>),
+    /// The motion on the robot's path at that stamp and at the reading's.
+    on_path: Option<[Motion<f64>; 2]>,
 }
 
 impl At {
@@ -37,7 +43,24 @@ impl At {
         let regime = track.regime_at(time_s)?;
         let pose = regime.pose?;
         let surroundings = evidence.surroundings(robot, time_s, Some(pose.position()));
-        Some(Self { instant: Instant { time_s, motion: motion(&regime, pose), surroundings }, regime, pose })
+        let reference = track.truth_near(time_s)?;
+        let on_path = track.path().motion_at(reference.0).zip(track.path().motion_at(time_s));
+        let on_path = on_path.map(|(first, last)| [first, last]);
+        Some(Self { time_s, motion: motion(&regime, pose), surroundings, regime, pose, reference, on_path })
+    }
+
+    /// The instant for a model that leaves the reference alone.
+    pub(crate) fn bare(&self) -> Instant<'static> {
+        let Self { time_s, motion, surroundings, .. } = *self;
+        Instant { time_s, motion, surroundings, anchor: None, target: None }
+    }
+
+    /// The instant, with the robot's path to carry the reference pose along.
+    pub(crate) fn instant<'a>(&self, track: &'a Track) -> Instant<'a> {
+        let (time_s, pose) = self.reference;
+        let anchor = self.on_path.map(|on_path| Anchor { time_s, pose, path: track.path(), on_path });
+        let Self { time_s, motion, surroundings, .. } = *self;
+        Instant { time_s, motion, surroundings, anchor, target: None }
     }
 }
 
@@ -87,25 +110,29 @@ pub(crate) fn heading_plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Head
 }
 
 /// Position, in the robot's true frame: forward and left.
-pub(crate) fn gps<S: Scalar>(plan: &Plan<Fix>, model: &RobotModel<S>) -> ChannelResiduals<S> {
+pub(crate) fn gps<S: Scalar>(track: &Track, plan: &Plan<Fix>, model: &RobotModel<S>) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(Channel::Gps, plan);
     let sigma = model.nominal.gps_sigma_m;
     for Fix { at, measured_m: [x_m, y_m] } in &plan.items {
-        let [x, y] = predict::gps(model, &at.instant);
+        let [x, y] = predict::gps(model, &at.instant(track));
         let frame: Pose<S> = Pose::constant(at.pose.x_m, at.pose.y_m, at.pose.yaw_rad);
         let values = frame.rotate_back([-x + *x_m, -y + *y_m]);
-        channel.push(Residual::new(at.instant.time_s, at.regime, None, &values, &[sigma, sigma]));
+        channel.push(Residual::new(at.time_s, at.regime, None, &values, &[sigma, sigma]));
     }
     channel
 }
 
 /// Heading, wrapped.
-pub(crate) fn heading<S: Scalar>(plan: &Plan<Heading>, model: &RobotModel<S>) -> ChannelResiduals<S> {
+pub(crate) fn heading<S: Scalar>(
+    track: &Track,
+    plan: &Plan<Heading>,
+    model: &RobotModel<S>,
+) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(Channel::Heading, plan);
     for Heading { at, measured_rad } in &plan.items {
-        let value = (-predict::heading(model, &at.instant) + *measured_rad).wrapped();
+        let value = (-predict::heading(model, &at.instant(track)) + *measured_rad).wrapped();
         let sigma = model.nominal.heading_sigma_rad;
-        channel.push(Residual::new(at.instant.time_s, at.regime, None, &[value], &[sigma]));
+        channel.push(Residual::new(at.time_s, at.regime, None, &[value], &[sigma]));
     }
     channel
 }

@@ -1,20 +1,25 @@
 //! One robot's odometry, commands and truth, asked for any instant.
 
+use std::ops::Range;
+
 use pleiad_estimation::Timestamp;
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_physics::chain::actuator::Command;
-use pleiad_physics::predict::EncoderSample;
+use pleiad_physics::predict::{EncoderSample, Path};
 use pleiad_physics::{Drive, Motion, Pose, RobotModel};
 use pleiad_recording::{RobotRecording, TruthSample};
 
 use crate::reckoning::{Reckoned, Reckoning, Step};
 use crate::residual::{Omission, Regime};
+use crate::windows::Window;
 
 /// Velocity is the motion from this long before an instant to this long after it, seconds: long enough
 /// that a tick of a coarse encoder is small, short against any manoeuvre.
 const VELOCITY_REACH_S: f64 = 0.05;
 /// A truth sample is carried no farther than this, seconds.
 const TRUTH_REACH_S: f64 = 0.1;
+/// By a clock's error or a latency a reference pose is carried no farther along the encoders, seconds.
+const CARRY_REACH_S: f64 = 1.2;
 /// A step between samples is a pause if it is longer than this many median steps.
 const PAUSE_FACTOR: f64 = 5.0;
 /// A step between commands is no gap up to this, seconds: a logger that is late now and then is usual.
@@ -129,6 +134,40 @@ impl Track {
         self.reckoning.at(time_s)
     }
 
+    /// Where the odometry took the robot, in a frame of its own.
+    pub(crate) fn path(&self) -> &Reckoning {
+        &self.reckoning
+    }
+
+    /// The path in the map, by the truth sample nearest to an instant.
+    pub(crate) fn path_in_map(&self, time_s: f64) -> Option<PathInMap<'_>> {
+        let (stamp_s, pose) = self.truth_near(time_s)?;
+        let path_from_robot = self.reckoned_at(stamp_s)?.pose;
+        let map_from_path = pose.compose(&path_from_robot.between(&Pose::identity()));
+        Some(PathInMap { map_from_path, path: &self.reckoning })
+    }
+
+    /// The encoder samples around a window that join it without a pause, as far as a reference pose may have
+    /// to be carried.
+    pub(crate) fn reach(&self, window: &Window) -> Range<usize> {
+        let samples = &self.encoders;
+        let joins = |index: usize| samples[index + 1].time_s - samples[index].time_s <= self.pause_s;
+        let (mut begin, mut end) = (window.first, window.last);
+        while begin > 0
+            && joins(begin - 1)
+            && samples[window.first].time_s - samples[begin].time_s < CARRY_REACH_S
+        {
+            begin -= 1;
+        }
+        while end + 1 < samples.len()
+            && joins(end)
+            && samples[end].time_s - samples[window.last].time_s < CARRY_REACH_S
+        {
+            end += 1;
+        }
+        begin..end + 1
+    }
+
     /// Mean forward speed and yaw rate around an instant, over what of it was recorded.
     fn velocity_at(&self, time_s: f64) -> Option<(f64, f64)> {
         let (first_s, last_s) = self.reckoning.span_s()?;
@@ -140,20 +179,23 @@ impl Track {
         (lasted_s > 0.0).then_some(rates)
     }
 
+    /// The truth sample with the nearest stamp, and its stamp. `None` where none is near.
+    pub(crate) fn truth_near(&self, time_s: f64) -> Option<(f64, Pose<f64>)> {
+        let after = self.truth.partition_point(|(stamp_s, _)| *stamp_s < time_s);
+        let near = [after.checked_sub(1), Some(after)].into_iter().flatten();
+        let nearest = near
+            .filter_map(|index| self.truth.get(index))
+            .min_by(|(a, _), (b, _)| (a - time_s).abs().total_cmp(&(b - time_s).abs()))?;
+        ((nearest.0 - time_s).abs() <= TRUTH_REACH_S).then_some(*nearest)
+    }
+
     /// The true pose at an instant: the truth sample with the nearest stamp, carried by the odometry.
     ///
     /// Interpolated truth would be differentiated truth: its noise would depend on the sample's phase.
     /// `None` where no truth is near, or the odometry was not recorded.
     pub(crate) fn truth_at(&self, time_s: f64) -> Option<Pose<f64>> {
-        let after = self.truth.partition_point(|(stamp_s, _)| *stamp_s < time_s);
-        let near = [after.checked_sub(1), Some(after)].into_iter().flatten();
-        let (stamp_s, pose) = near
-            .filter_map(|index| self.truth.get(index))
-            .min_by(|(a, _), (b, _)| (a - time_s).abs().total_cmp(&(b - time_s).abs()))?;
-        if (stamp_s - time_s).abs() > TRUTH_REACH_S {
-            return None;
-        }
-        let moved = self.reckoned_at(*stamp_s)?.pose.between(&self.reckoned_at(time_s)?.pose);
+        let (stamp_s, pose) = self.truth_near(time_s)?;
+        let moved = self.reckoned_at(stamp_s)?.pose.between(&self.reckoned_at(time_s)?.pose);
         Some(pose.compose(&moved))
     }
 
@@ -166,6 +208,19 @@ impl Track {
             .map_or(0.0, |((before, _), (after, _))| after - before);
         let acceleration_m_s2 = change / (2.0 * VELOCITY_REACH_S);
         Some(Regime { speed_m_s, yaw_rate_rad_s, acceleration_m_s2, pose: self.truth_at(time_s) })
+    }
+}
+
+/// A robot's path in the map.
+pub(crate) struct PathInMap<'a> {
+    map_from_path: Pose<f64>,
+    path: &'a Reckoning,
+}
+
+impl Path for PathInMap<'_> {
+    fn motion_at(&self, time_s: f64) -> Option<Motion<f64>> {
+        let motion = self.path.motion_at(time_s)?;
+        Some(Motion { pose: self.map_from_path.compose(&motion.pose), ..motion })
     }
 }
 

@@ -5,6 +5,8 @@ use crate::channel::Channel;
 /// Residuals of one component of a channel, before and after the correction.
 #[derive(Clone, Debug)]
 pub struct ResidualSeries {
+    /// The name of the recording.
+    pub recording: String,
     /// Which robot.
     pub robot: u32,
     /// Which channel.
@@ -29,6 +31,8 @@ pub struct ResidualSeries {
 pub struct PartialResidual {
     /// The position among the findings.
     pub finding: usize,
+    /// The name of the recording.
+    pub recording: String,
     /// Which robot.
     pub robot: u32,
     /// Which channel.

@@ -41,7 +41,7 @@ impl Case<'_> {
         }
         let effect = ActiveEffect::new(self.effect, self.values).unwrap();
         let model = RobotModel::nominal(self.drive, Nominal::ideal(RADIUS_M, TRACK_M)).with(effect);
-        let window = BodyWindow { samples: &samples, start: self.start, surroundings: self.surroundings };
+        let window = BodyWindow::whole(&samples, self.start, self.surroundings);
         body_motion(&model, &window, &mut BodyState::default())
     }
 

@@ -94,10 +94,14 @@ fn clock_offset_and_truth_latency_are_opposite_for_one_robot() {
         let angle_rad = [0, 1].map(|wheel: usize| last.angle_rad[wheel] + 0.05 * rate(i)[wheel]);
         samples.push(EncoderSample { time_s: last.time_s + 0.05, angle_rad, ..last });
     }
-    let window =
-        BodyWindow { samples: &samples, start: Pose::identity(), surroundings: Surroundings::default() };
+    let window = BodyWindow::whole(&samples, Pose::identity(), Surroundings::default());
     let change = |effect, value: f64| {
-        let pose = truth_change(&case(effect, &[value]).model, &window, &mut BodyState::default());
+        let pose = truth_change(
+            &case(effect, &[value]).model,
+            &window,
+            window.stamps_s(),
+            &mut BodyState::default(),
+        );
         [pose.x_m, pose.y_m, pose.yaw_rad]
     };
     close(change(Effect::ClockOffset, 0.03), change(Effect::TruthLatency, -0.03));

@@ -13,10 +13,11 @@ const UNDECLARED_RANGE_M: f64 = 100.0;
 pub(crate) fn corrected(own: &Prepared<'_>, found: &[&Judged]) -> Nominal {
     let mut nominal = own.recording.nominal.clone().unwrap_or_else(|| undeclared(own));
     for judged in found {
-        let term = &judged.estimated.term;
-        for (robot, declared) in &mut nominal.robots {
-            if term.acts_on(*robot) {
-                declared.effects.push(effect(&judged.estimated));
+        for estimated in &judged.estimated {
+            for (robot, declared) in &mut nominal.robots {
+                if estimated.term.acts_on(*robot) {
+                    declared.effects.push(effect(estimated));
+                }
             }
         }
     }
@@ -29,10 +30,20 @@ fn effect(estimated: &Estimated) -> DeclaredEffect {
     DeclaredEffect { active, ci95 }
 }
 
-/// The section of a model file that applies a finding.
-pub(crate) fn section(estimated: &Estimated) -> String {
-    let spec = EffectSpec::from(&effect(estimated));
-    toml::to_string(&spec).map_or_else(|_| String::new(), |text| text.trim_end().to_owned())
+/// The sections of a model file that apply a finding to a robot.
+pub(crate) fn sections(robots: &[u32], found: &[Estimated]) -> String {
+    let mut sections = Vec::new();
+    for robot in robots {
+        for estimated in found {
+            let spec = EffectSpec::from(&effect(estimated));
+            let parameters = toml::Value::Table(spec.parameters);
+            sections.push(format!(
+                "[[robots.r{robot}.effects]]\nname = \"{}\"\nparameters = {parameters}",
+                spec.name
+            ));
+        }
+    }
+    sections.join("\n\n")
 }
 
 /// A model file for a recording that came without one: what the built-in model holds.

@@ -11,10 +11,12 @@ mod corrected;
 mod entries;
 mod fit;
 mod held_out;
+mod known;
 mod naming;
 mod noise;
 mod parallel;
 mod power;
+mod profile;
 mod refine;
 mod rolled;
 mod run;
@@ -28,4 +30,5 @@ mod touch;
 mod unit;
 mod white;
 
+pub use known::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known};
 pub(crate) use run::run;

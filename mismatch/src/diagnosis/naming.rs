@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use nalgebra::DMatrix;
-use pleiad_physics::{Effect, Parameter, Scalar};
+use pleiad_physics::{Channel as Needed, Effect, Parameter, Scalar};
 
 use crate::channel::Channel;
 use crate::diagnosis::chi_square::upper_tail;
@@ -19,7 +19,7 @@ use crate::diagnosis::unit::{Row, Unit};
 use crate::findings::{Estimate, Place, Verdict};
 
 /// Half the width of a 95 % interval, in standard errors.
-const Z_95: f64 = 1.959_963_984_540_054;
+pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
 /// The near end of this many standard errors must be beyond the threshold of relevance.
 pub(crate) const NEAR_END: f64 = 3.0;
 /// The cross-fitted gain must exceed this many standard errors.
@@ -54,17 +54,18 @@ impl Estimated {
     /// Of two ways to write the same, the one with a positive amplitude: its phase is half a turn away.
     fn make_positive(&mut self) {
         let parameters = self.term.parameters();
-        let [amplitude, phase] = parameters else { return };
+        let [.., amplitude, phase] = parameters else { return };
         let turns = phase.unit == "rad" && phase.plausible.1 - phase.plausible.0 > PI;
         if !turns || phase.relevance.threshold(&pleiad_physics::Floors::default()) > 0.0 {
             return;
         }
-        if amplitude.plausible.0 < 0.0 && self.term.values[0] < 0.0 {
+        let [.., size, angle] = self.term.values.as_mut_slice() else { return };
+        if amplitude.plausible.0 < 0.0 && *size < 0.0 {
             let period = phase.plausible.1 - phase.plausible.0;
             let half_turn = if period > 2.0 * PI { PI } else { 0.5 * PI };
-            self.term.values[0] = -self.term.values[0];
-            let moved = self.term.values[1] + half_turn;
-            self.term.values[1] = if half_turn < PI { (2.0 * moved).wrapped() * 0.5 } else { moved.wrapped() };
+            *size = -*size;
+            let moved = *angle + half_turn;
+            *angle = if half_turn < PI { (2.0 * moved).wrapped() * 0.5 } else { moved.wrapped() };
         }
     }
 
@@ -89,6 +90,11 @@ impl Estimated {
         self.term.parameters().iter().enumerate().filter_map(one).collect()
     }
 
+    /// Whether the term can be relevant to a unit at all.
+    pub(crate) fn may_be_relevant(&self, unit: &Unit<'_>) -> bool {
+        self.is_relevant(unit).unwrap_or(true)
+    }
+
     /// Whether the near end of some parameter is beyond its threshold of relevance; `None` if no parameter
     /// has one.
     fn is_relevant(&self, unit: &Unit<'_>) -> Option<bool> {
@@ -108,7 +114,10 @@ impl Estimated {
 /// How a term fares under the rules of evidence.
 #[derive(Clone, Debug)]
 pub(crate) struct Judged {
-    pub(crate) estimated: Estimated,
+    /// The parameters of its terms, the main one first.
+    pub(crate) estimated: Vec<Estimated>,
+    /// A parameter that only the terms together have.
+    pub(crate) total: Option<(String, Estimate)>,
     pub(crate) verdict: Option<Verdict>,
     pub(crate) p_familywise: f64,
     pub(crate) channel: Channel,
@@ -117,34 +126,35 @@ pub(crate) struct Judged {
     pub(crate) one_off: bool,
 }
 
-/// Judges a term. `verdict` is `None` for a nuisance: significant, but too small, or of no use on data that
-/// it was not fitted on.
-pub(crate) fn judge(
-    units: &[&Unit<'_>],
-    support: &Support,
-    estimated: Estimated,
-    full: (&Fit, &DMatrix<f64>, usize),
-    gain: Gain,
-    tests: usize,
-) -> Judged {
+/// Judges terms that make one finding. `verdict` is `None` for a nuisance: significant, but too small, or of
+/// no use on data that it was not fitted on.
+pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: usize) -> Judged {
+    let (fit, covariance, group) = (&support.with, &support.covariance, &support.group);
+    let estimated: Vec<Estimated> =
+        group.iter().map(|&position| Estimated::of(fit, covariance, position)).collect();
     let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
-    let parameters = estimated.errors.iter().flatten().count().max(1);
-    let ratio =
-        2.0 * (support.with.log_likelihood - support.without.log_likelihood) / support.inflation;
+    let parameters = estimated.iter().flat_map(|own| own.errors.iter().flatten()).count().max(1);
+    let ratio = 2.0 * (support.with.log_likelihood - support.without.log_likelihood) / support.inflation;
     let p_ratio = upper_tail(ratio, parameters);
-    let p_wald = wald(full.0, full.1, full.2).map_or(0.0, |(wald, count)| upper_tail(wald, count));
+    let p_wald = wald(fit, covariance, group).map_or(0.0, |(wald, count)| upper_tail(wald, count));
     let p_familywise = (p_ratio.max(p_wald) * tests as f64).min(1.0);
-    let effect = estimated.term.effect;
+    let main = &estimated[0];
+    let effect = main.term.effect;
     let one_off = is_impulse(effect);
+    let total = total(fit, covariance, group);
     let relevant = acting
         .iter()
-        .filter_map(|unit| estimated.is_relevant(unit))
+        .flat_map(|unit| estimated.iter().filter_map(|own| own.is_relevant(unit)))
         .reduce(|a, b| a || b)
-        .unwrap_or_else(|| changes_enough(&acting, support));
+        .unwrap_or_else(|| changes_enough(&acting, support))
+        || total.as_ref().is_some_and(|(_, total)| total.ci95[0] > 0.0);
     let useful = one_off || gain.total > GAIN_ERRORS * gain.standard_error;
     let named = p_familywise < FAMILYWISE && relevant && useful;
+    // Without encoders a name that needs them can only be a member of a set.
+    let unseen = effect.info().channels.contains(&Needed::Encoders)
+        && acting.iter().all(|unit| unit.stretch(Channel::CommandedBody).is_some());
     let verdict = named.then(|| {
-        if support.members.len() > 1 {
+        if support.members.len() > 1 || unseen {
             Verdict::CannotTell
         } else if effect.info().bad_data {
             Verdict::BadData
@@ -152,8 +162,51 @@ pub(crate) fn judge(
             Verdict::Named
         }
     });
-    let place = place(&acting, support, &estimated.term);
-    Judged { estimated, verdict, p_familywise, channel: channel(&acting, support), place, one_off }
+    let place = place(&acting, support, &main.term);
+    let channel = channel(&acting, support);
+    Judged { estimated, total, verdict, p_familywise, channel, place, one_off }
+}
+
+/// Lag and delay together: without encoders their sum is known far better than either.
+fn total(fit: &Fit, covariance: &DMatrix<f64>, group: &[usize]) -> Option<(String, Estimate)> {
+    let &[first, second] = group else { return None };
+    let [a, b] = [first, second].map(|term| fit.slots.iter().position(|slot| *slot == (term, 0)));
+    let (a, b) = (a?, b?);
+    let variance = covariance[(a, a)] + covariance[(b, b)] + 2.0 * covariance[(a, b)];
+    let value = fit.terms[first].values[0] + fit.terms[second].values[0];
+    let half = Z_95 * variance.max(0.0).sqrt();
+    Some(("total_s".to_owned(), Estimate { value, unit: "s".to_owned(), ci95: [value - half, value + half] }))
+}
+
+/// Terms that make one finding: without encoders, lag and delay of a robot; else each its own.
+pub(crate) fn groups(units: &[&Unit<'_>], terms: &[Term]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (position, term) in terms.iter().enumerate() {
+        let partner = groups.iter_mut().find(|group| {
+            let other = &terms[group[0]];
+            group.len() == 1 && twin(term.effect) == Some(other.effect) && other.whose == term.whose
+        });
+        match partner {
+            Some(group) if is_unseen(units, term) => group.push(position),
+            _ => groups.push(vec![position]),
+        }
+    }
+    groups
+}
+
+/// The effect that cannot be told from another without encoders.
+pub(crate) fn twin(effect: Effect) -> Option<Effect> {
+    match effect {
+        Effect::ActuatorLag => Some(Effect::CommandDelay),
+        Effect::CommandDelay => Some(Effect::ActuatorLag),
+        _ => None,
+    }
+}
+
+/// Whether a term acts on robots without encoders only.
+pub(crate) fn is_unseen(units: &[&Unit<'_>], term: &Term) -> bool {
+    let mut acting = units.iter().filter(|unit| term.acts_on(unit.robot)).peekable();
+    acting.peek().is_some() && acting.all(|unit| unit.stretch(Channel::CommandedBody).is_some())
 }
 
 /// Effects of one instant.
@@ -171,9 +224,7 @@ fn changes_enough(units: &[&Unit<'_>], support: &Support) -> bool {
             let range = stretch.range();
             let in_stretch = range
                 .clone()
-                .filter(|&row| {
-                    (with.residuals[row] - without.residuals[row]).abs() > with.noise.sigma[row]
-                })
+                .filter(|&row| (with.residuals[row] - without.residuals[row]).abs() > with.noise.sigma[row])
                 .count();
             if in_stretch > 0 {
                 changed += in_stretch;

@@ -1,10 +1,14 @@
 //! Roll-outs: how far predictions are off after a while, under the nominal model, the nominal model refitted,
 //! and the corrected one, on data that were not fitted.
 
+use std::collections::BTreeMap;
+
+use pleiad_estimation::RobotId;
 use pleiad_physics::{Effect, RobotModel};
 
 use crate::diagnosis::fit::{Effort, Fit, fit};
 use crate::diagnosis::held_out::{FOLDS, fold, left_out};
+use crate::diagnosis::parallel;
 use crate::diagnosis::run::{Judgement, Prepared};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
@@ -21,91 +25,77 @@ pub(crate) struct Roller<'r, 'a> {
     pub(crate) tests: &'r [&'r Unit<'a>],
 }
 
-/// Squared errors per horizon: position, heading, count.
+/// Sums per horizon: squared errors of position and of heading, and their number.
 type Sums = Vec<[f64; 3]>;
 
-/// The roll-outs of a finding's robots: nominal, refitted without it, corrected.
-pub(crate) fn of_finding(roller: &Roller<'_, '_>, own: &Judgement, kept: &[Term]) -> Vec<RollOut> {
-    let term = &own.judged.estimated.term;
-    let units: Vec<&Unit<'_>> = own.support.units.iter().map(|&unit| roller.units[unit]).collect();
-    rolled(roller, &units, kept, Some(term.effect))
+/// The roll-outs of a robot.
+pub(crate) struct Rolled {
+    nominal: Sums,
+    corrected: Sums,
+    /// The nominal model refitted, without none or one of its parameters.
+    refitted: BTreeMap<Option<Effect>, Sums>,
 }
 
-/// The roll-outs of every robot under everything found.
-pub(crate) fn per_robot(roller: &Roller<'_, '_>, fit: &Fit, kept: &[Term]) -> Vec<RobotRollOuts> {
-    let _ = fit;
-    let mut robots: Vec<_> = roller.units.iter().map(|unit| unit.robot).collect();
+/// Rolls out every robot that something was found of, and the others under the nominal model alone.
+pub(crate) fn robots(roller: &Roller<'_, '_>, kept: &[Term]) -> BTreeMap<RobotId, Rolled> {
+    let mut robots: Vec<RobotId> = roller.units.iter().map(|unit| unit.robot).collect();
     robots.sort_unstable();
     robots.dedup();
-    let one = |robot| {
-        let units: Vec<&Unit<'_>> =
-            roller.units.iter().copied().filter(|unit| unit.robot == robot).collect();
-        let horizons = rolled(roller, &units, kept, None);
-        let speeds: Vec<f64> = units
-            .iter()
-            .flat_map(|unit| unit.rows.iter().map(|row| row.regime.speed_m_s.abs()))
-            .collect();
-        let speed_m_s = speeds.iter().sum::<f64>() / speeds.len().max(1) as f64;
-        let last = horizons.last()?;
-        let factor = 100.0 / (speed_m_s * last.horizon_s).max(1e-9);
-        let error_per_100_m = [last.nominal * factor, last.corrected * factor];
-        Some(RobotRollOuts { robot: robot.0, horizons, error_per_100_m })
-    };
-    robots.into_iter().filter_map(one).collect()
-}
-
-fn rolled(roller: &Roller<'_, '_>, units: &[&Unit<'_>], kept: &[Term], without: Option<Effect>) -> Vec<RollOut> {
-    let Some(robot) = units.first().map(|unit| unit.robot) else { return Vec::new() };
-    let mut sums: [Sums; 3] = std::array::from_fn(|_| vec![[0.0; 3]; HORIZONS_S.len()]);
-    let mut robots: Vec<_> = units.iter().map(|unit| unit.robot).collect();
-    robots.sort_unstable();
-    robots.dedup();
-    let _ = robot;
-    for robot in robots {
-        let own: Vec<&Unit<'_>> = units.iter().copied().filter(|unit| unit.robot == robot).collect();
-        let refitted: Vec<Term> = REFITTED
-            .iter()
-            .filter(|effect| Some(**effect) != without)
-            .map(|&effect| {
-                let off = effect.info().parameters.iter().map(|parameter| parameter.off).collect();
-                Term::new(effect, Whose::Robot(robot), off)
-            })
-            .collect();
-        let refit = fit(&own, refitted, &|_| true, Effort::RIVAL);
+    let rolled = parallel::map(&robots, |&robot| {
+        let own: Vec<&Unit<'_>> = roller.units.iter().copied().filter(|unit| unit.robot == robot).collect();
         let mine: Vec<Term> = kept.iter().filter(|term| term.acts_on(robot)).cloned().collect();
+        let nominal = sums(roller, &own, None);
+        let mut refitted = BTreeMap::new();
+        let without = mine.iter().map(|term| term.effect).filter(|effect| REFITTED.contains(effect));
+        for without in [None].into_iter().chain(without.map(Some)) {
+            refitted.insert(without, sums(roller, &own, refit(&own, robot, without).as_ref()));
+        }
         let movable: Vec<bool> = mine.iter().map(|term| term.whose == Whose::Robot(robot)).collect();
-        let corrected = fit(&own, mine, &|index| movable[index], Effort::RIVAL);
-        let (Some(refit), Some(corrected)) = (refit, corrected) else { continue };
-        let tests: Vec<&Unit<'_>> = roller.tests.iter().copied().filter(|unit| unit.robot == robot).collect();
-        for unit in if tests.is_empty() { &own } else { &tests } {
-            let folds: Vec<usize> = if tests.is_empty() { (0..FOLDS).collect() } else { vec![0] };
-            let evidence = &roller.prepared[unit.recording].evidence;
-            let nominal = rollouts(evidence, unit.robot, &unit.nominal, &HORIZONS_S);
-            add(&mut sums[0], &nominal, &|_| true);
-            for number in folds {
+        let corrected = if mine.is_empty() {
+            nominal.clone()
+        } else {
+            sums(roller, &own, fit(&own, mine, &|index| movable[index], Effort::RIVAL).as_ref())
+        };
+        Rolled { nominal, corrected, refitted }
+    });
+    robots.into_iter().zip(rolled).collect()
+}
+
+/// The nominal model refitted without one of its parameters.
+fn refit(units: &[&Unit<'_>], robot: RobotId, without: Option<Effect>) -> Option<Fit> {
+    let term = |&effect: &Effect| {
+        let off = effect.info().parameters.iter().map(|parameter| parameter.off).collect();
+        Term::new(effect, Whose::Robot(robot), off)
+    };
+    let terms = REFITTED.iter().filter(|effect| Some(**effect) != without).map(term).collect();
+    fit(units, terms, &|_| true, Effort::RIVAL)
+}
+
+/// Sums of roll-outs under a fit, or under the nominal model: on the recordings to test on, or else fold by
+/// fold with the fit of the rest.
+fn sums(roller: &Roller<'_, '_>, own: &[&Unit<'_>], fit: Option<&Fit>) -> Sums {
+    let mut sums = vec![[0.0; 3]; HORIZONS_S.len()];
+    let robot = own.first().map(|unit| unit.robot);
+    let tests: Vec<&Unit<'_>> =
+        roller.tests.iter().copied().filter(|unit| Some(unit.robot) == robot).collect();
+    let roll = |unit: &Unit<'_>, model: &RobotModel<f64>| {
+        rollouts(&roller.prepared[unit.recording].evidence, unit.robot, model, &HORIZONS_S)
+    };
+    if !tests.is_empty() || fit.is_none_or(|fit| fit.slots.is_empty()) {
+        for unit in if tests.is_empty() { own } else { &tests } {
+            let model = fit.map_or_else(|| unit.nominal.clone(), |fit| unit.model(&fit.terms));
+            add(&mut sums, &roll(unit, &model), &|_| true);
+        }
+    } else if let Some(fit) = fit {
+        for number in 0..FOLDS {
+            let (terms, _) = left_out(own, fit, number);
+            for unit in own {
                 let within = fold(unit, number);
-                let kept = |rollout: &Rollout| !tests.is_empty() || within.contains(&rollout.time_s);
-                let at = |fit: &Fit| -> RobotModel<f64> {
-                    if tests.is_empty() && !fit.slots.is_empty() {
-                        unit.model(&left_out(&own, fit, number).0)
-                    } else {
-                        unit.model(&fit.terms)
-                    }
-                };
-                add(&mut sums[1], &rollouts(evidence, unit.robot, &at(&refit), &HORIZONS_S), &kept);
-                add(&mut sums[2], &rollouts(evidence, unit.robot, &at(&corrected), &HORIZONS_S), &kept);
+                add(&mut sums, &roll(unit, &unit.model(&terms)), &|rollout| within.contains(&rollout.time_s));
             }
         }
     }
-    let rms = |sums: &[f64; 3], which: usize| (sums[which] / sums[2]).sqrt();
-    (0..HORIZONS_S.len())
-        .filter(|&index| sums.iter().all(|sums| sums[index][2] > 0.0))
-        .map(|index| {
-            let [nominal, refit, corrected] = [0, 1, 2].map(|model| rms(&sums[model][index], 0));
-            let heading_rad = [0, 1, 2].map(|model| rms(&sums[model][index], 1));
-            RollOut { horizon_s: HORIZONS_S[index], nominal, refit, corrected, heading_rad }
-        })
-        .collect()
+    sums
 }
 
 fn add(sums: &mut Sums, rollouts: &[Vec<Rollout>], kept: &dyn Fn(&Rollout) -> bool) {
@@ -116,4 +106,56 @@ fn add(sums: &mut Sums, rollouts: &[Vec<Rollout>], kept: &dyn Fn(&Rollout) -> bo
             sums[2] += 1.0;
         }
     }
+}
+
+/// The roll-outs of a finding's robots.
+pub(crate) fn of_finding(
+    rolled: &BTreeMap<RobotId, Rolled>,
+    units: &[&Unit<'_>],
+    own: &Judgement,
+) -> Vec<RollOut> {
+    let effect = own.judged.estimated[0].term.effect;
+    let without = REFITTED.contains(&effect).then_some(effect);
+    let mut robots: Vec<RobotId> = own.support.units.iter().map(|&unit| units[unit].robot).collect();
+    robots.sort_unstable();
+    robots.dedup();
+    horizons(&robots.iter().filter_map(|robot| rolled.get(robot)).collect::<Vec<_>>(), without)
+}
+
+/// The roll-outs of every robot.
+pub(crate) fn per_robot(rolled: &BTreeMap<RobotId, Rolled>, units: &[&Unit<'_>]) -> Vec<RobotRollOuts> {
+    let one = |(&robot, rolled): (&RobotId, &Rolled)| {
+        let horizons = horizons(&[rolled], None);
+        let own = units.iter().filter(|unit| unit.robot == robot);
+        let speeds: Vec<f64> =
+            own.flat_map(|unit| unit.rows.iter().map(|row| row.regime.speed_m_s.abs())).collect();
+        let speed_m_s = speeds.iter().sum::<f64>() / speeds.len().max(1) as f64;
+        let last = horizons.last()?;
+        let factor = 100.0 / (speed_m_s * last.horizon_s).max(1e-9);
+        let error_per_100_m = [last.nominal * factor, last.corrected * factor];
+        Some(RobotRollOuts { robot: robot.0, horizons, error_per_100_m })
+    };
+    rolled.iter().filter_map(one).collect()
+}
+
+fn horizons(robots: &[&Rolled], without: Option<Effect>) -> Vec<RollOut> {
+    let none = vec![[0.0; 3]; HORIZONS_S.len()];
+    let at = |index: usize| {
+        let rms = |of: &dyn Fn(&Rolled) -> [f64; 3]| {
+            let sums = robots.iter().map(|robot| of(robot));
+            let total = sums.fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
+            (total[2] > 0.0).then(|| [(total[0] / total[2]).sqrt(), (total[1] / total[2]).sqrt()])
+        };
+        let nominal = rms(&|robot| robot.nominal[index])?;
+        let refit = rms(&|robot| robot.refitted.get(&without).unwrap_or(&none)[index])?;
+        let corrected = rms(&|robot| robot.corrected[index])?;
+        Some(RollOut {
+            horizon_s: HORIZONS_S[index],
+            nominal: nominal[0],
+            refit: refit[0],
+            corrected: corrected[0],
+            heading_rad: [nominal[1], refit[1], corrected[1]],
+        })
+    };
+    (0..HORIZONS_S.len()).filter_map(at).collect()
 }

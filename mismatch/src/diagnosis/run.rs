@@ -2,22 +2,21 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::DMatrix;
 use pleiad_estimation::RobotId;
-use pleiad_physics::{Effect, Floors, RobotModel};
+use pleiad_physics::{Floors, RobotModel};
 use pleiad_recording::Recording;
 
 use crate::builtin;
 use crate::diagnose::{DiagnoseOptions, Diagnosis, TruthUse};
 use crate::diagnosis::corrected;
 use crate::diagnosis::entries::{Entries, entries};
-use crate::diagnosis::fit::{Fit, State, states};
+use crate::diagnosis::fit::{Effort, Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
-use crate::diagnosis::naming::{Estimated, Judged, disguise, judge};
+use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, is_unseen, judge, twin};
 use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
-use crate::diagnosis::rolled::{self, Roller};
-use crate::diagnosis::select::{Pool, Scored, covariance, select};
+use crate::diagnosis::rolled::{self, Rolled, Roller};
+use crate::diagnosis::select::{Pool, Selected, select};
 use crate::diagnosis::series;
 use crate::diagnosis::spread::{self, SpreadTerm};
 use crate::diagnosis::support::{Support, support};
@@ -25,7 +24,7 @@ use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
-use crate::findings::{Finding, Findings, HeldOut, Verdict};
+use crate::findings::{Estimate, Finding, Findings, HeldOut, Verdict};
 
 /// The spread of a uniform distribution of length one.
 const UNIFORM_SIGMA: f64 = 0.288_675_134_594_812_9;
@@ -40,7 +39,8 @@ pub(crate) struct Prepared<'a> {
 
 /// A term that was judged, with what it was judged by.
 pub(crate) struct Judgement {
-    pub(crate) position: usize,
+    /// The positions of its terms in the fit.
+    pub(crate) group: Vec<usize>,
     pub(crate) support: Support,
     pub(crate) judged: Judged,
     pub(crate) gain: Gain,
@@ -69,25 +69,28 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         all.iter().filter(|unit| !prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
-    let mut entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let mut entries =
+        entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
     let spread_entries = spread::take(&mut entries, &units);
 
     let mut notes = notes(&prepared, &all);
     let selected = select(&units, &entries.entries);
-    let (fit, count) = match selected {
-        Some(selected) => (selected.fit, selected.tests + spread_entries.len() + swaps.tests),
-        None => return Ok(nothing(&prepared, entries, notes, units.is_empty())),
+    let Some(Selected { fit, tests: count, mut pool }) = selected else {
+        return Ok(nothing(&prepared, entries, notes, units.is_empty()));
     };
-    let covariance =
-        covariance(&units, &fit).unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
-    let pool = Pool::default().scored(&units, &entries.entries, &fit);
-    let mut judgements = judgements(&units, &tests, &fit, &covariance, &pool, count);
+    let Some(fit) = paired(&units, fit) else {
+        return Ok(nothing(&prepared, entries, notes, false));
+    };
+    let count = count + spread_entries.len() + swaps.tests;
+    let scored = pool.scored(&units, &entries.entries, &fit);
+    let groups = groups(&units, &fit.terms);
+    let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
     let spread = spread::spread(&units, &tests, &fit, &spread_entries, &swaps, count);
     spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
-        let both = [first, second].map(|term| found.iter().any(|own| own.position == term));
+        let both = [first, second].map(|term| found.iter().any(|own| own.group.contains(&term)));
         if both == [true, true] {
             notes.push(format!(
                 "{} together with {} cannot be told from {} by any data: they move the robot alike",
@@ -97,26 +100,30 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
             ));
         }
     }
-    let unexplained = judgements.iter().filter(|own| !spread.explains(own.position));
-    notes.extend(unexplained.filter(|own| own.judged.verdict.is_none()).map(|own| nuisance(&own.judged)));
+    let named = |group: &&Vec<usize>| found.iter().any(|own| own.group == **group);
+    let unexplained = groups.iter().filter(|group| !spread.explains(group[0]));
+    notes.extend(unexplained.filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
     notes.extend(spread.nuisances());
     notes.extend(
         found
             .iter()
             .filter(|own| own.judged.one_off)
-            .map(|own| format!("{} happened once and could not be cross-validated", own.judged.estimated.term.effect.name())),
+            .map(|own| format!("{} happened once and could not be cross-validated", own.name())),
     );
 
     let roller = Roller { prepared: &prepared, units: &units, tests: &tests };
-    let mut findings: Vec<Finding> =
-        parallel::map(&found, |own| finding(&units, &roller, &fit, &judgements, own, &entries));
+    let kept = kept(&fit, &judgements);
+    let rolled = rolled::robots(&roller, &kept);
+    let mut findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
     findings.extend(spread.found().into_iter().map(SpreadTerm::finding));
-    let mut undetected = undetected(&units, &pool, count);
+    let mut undetected = undetected(&units, &scored, count);
     undetected.extend_from_slice(&spread.undetected);
     entries.untestable.extend_from_slice(&spread.untestable);
-    let kept: Vec<Term> = found.iter().map(|own| fit.terms[own.position].clone()).collect();
-    let corrected_terms: Vec<&Judged> =
-        found.iter().map(|own| &own.judged).chain(spread.found().into_iter().map(|own| &own.judged)).collect();
+    let corrected_terms: Vec<&Judged> = found
+        .iter()
+        .map(|own| &own.judged)
+        .chain(spread.found().into_iter().map(|own| &own.judged))
+        .collect();
     let names = |tested: bool| -> Vec<String> {
         prepared.iter().filter(|own| own.tested == tested).map(|own| own.recording.name.clone()).collect()
     };
@@ -128,7 +135,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         findings,
         undetected,
         untestable: entries.untestable,
-        roll_outs: rolled::per_robot(&roller, &fit, &kept),
+        roll_outs: rolled::per_robot(&rolled, &units),
         notes,
     };
     let plots = series::plots(&prepared, &units, &fit, &kept, &found);
@@ -160,7 +167,12 @@ fn roles(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Vec<Opti
     Ok(roles)
 }
 
-fn unit<'a>(index: usize, own: &'a Prepared<'a>, robot: RobotId, model: &RobotModel<f64>) -> Unit<'a> {
+pub(crate) fn unit<'a>(
+    index: usize,
+    own: &'a Prepared<'a>,
+    robot: RobotId,
+    model: &RobotModel<f64>,
+) -> Unit<'a> {
     let floors = own.recording.nominal.as_ref().map_or_else(Floors::default, |nominal| Floors {
         lateral_slip_s: nominal.noise.odometry_floor_lateral_slip_s,
         sensor_lag_s: nominal.noise.gyro_floor_lag_s,
@@ -177,7 +189,8 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
     for unit in units {
         let name = &prepared[unit.recording].recording.name;
         for stretch in &unit.stretches {
-            for omission in &stretch.omissions {
+            let few = stretch.rows / FEW;
+            for omission in stretch.omissions.iter().filter(|omission| omission.matters(few)) {
                 notes.push(format!("{name}, robot {}, {}: {omission}", unit.robot, stretch.channel));
             }
         }
@@ -193,6 +206,8 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>]) -> Vec<String> {
     notes
 }
 
+/// What one row in so many lacks is not worth a note.
+const FEW: usize = 20;
 /// Below this, seconds, there are too few blocks of time for a robust variance.
 pub(crate) const SHORT_S: f64 = 20.0;
 
@@ -200,22 +215,21 @@ fn judgements(
     units: &[&Unit<'_>],
     tests: &[&Unit<'_>],
     fit: &Fit,
-    covariance: &DMatrix<f64>,
-    pool: &[Scored],
+    groups: &[Vec<usize>],
+    pool: &Pool,
     count: usize,
 ) -> Vec<Judgement> {
     let mut all = Vec::new();
-    for position in 0..fit.terms.len() {
-        let Some(support) = support(units, fit, position, pool) else { continue };
+    for group in groups {
+        let Some(support) = support(units, fit, group, pool) else { continue };
         let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
         let gain = if tests.is_empty() {
             cross_fitted(&acting, &support.with, &support.without)
         } else {
-            on_tests(tests, &fit.terms[position], &support)
+            on_tests(tests, &fit.terms[group[0]], &support)
         };
-        let estimated = Estimated::of(fit, covariance, position);
-        let judged = judge(units, &support, estimated, (fit, covariance, position), gain, count);
-        all.push(Judgement { position, support, judged, gain });
+        let judged = judge(units, &support, gain, count);
+        all.push(Judgement { group: group.clone(), support, judged, gain });
     }
     all
 }
@@ -238,17 +252,14 @@ fn ordered(judgements: &[Judgement]) -> Vec<&Judgement> {
 }
 
 /// Says what was significant and is no finding.
-pub(crate) fn nuisance(judged: &Judged) -> String {
-    let term = &judged.estimated.term;
+pub(crate) fn nuisance(term: &Term) -> String {
     let whose = match term.whose {
         Whose::Robot(robot) => format!("robot {robot}"),
         Whose::Everyone => "all robots".to_owned(),
     };
-    let values: Vec<String> = judged
-        .estimated
-        .parameters()
-        .into_iter()
-        .map(|(label, estimate)| format!("{label} = {:.3e} {}", estimate.value, estimate.unit))
+    let each = term.parameters().iter().zip(&term.values);
+    let values: Vec<String> = each
+        .map(|(parameter, value)| format!("{} = {value:.3e} {}", parameter.label(), parameter.unit))
         .collect();
     format!(
         "{whose}: {} ({}) is there, but too small to matter or of no use on data left out; it is no finding",
@@ -257,52 +268,74 @@ pub(crate) fn nuisance(judged: &Judged) -> String {
     )
 }
 
-fn finding(
-    units: &[&Unit<'_>],
-    roller: &Roller<'_, '_>,
-    fit: &Fit,
-    judgements: &[Judgement],
-    own: &Judgement,
-    entries: &Entries,
-) -> Finding {
-    let term = &own.judged.estimated.term;
-    let info = term.effect.info();
-    let robots: BTreeSet<u32> =
-        own.support.units.iter().map(|&unit| units[unit].robot.0).collect();
+fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgement) -> Finding {
+    let info = own.judged.estimated[0].term.effect.info();
+    let robots: BTreeSet<u32> = own.support.units.iter().map(|&unit| units[unit].robot.0).collect();
+    let robots: Vec<u32> = robots.into_iter().collect();
     let mut support_set: Vec<String> =
         own.support.members.iter().map(|effect| effect.name().to_owned()).collect();
     support_set.dedup();
     let verdict = own.judged.verdict.unwrap_or(Verdict::CannotTell);
-    let rivals: Vec<Effect> = own.support.members.iter().skip(1).copied().collect();
-    let _ = entries;
-    let manoeuvre = (!rivals.is_empty()).then(|| info.broken_by.to_owned());
-    let kept: Vec<Term> = judgements
-        .iter()
-        .filter(|other| other.judged.verdict.is_some())
-        .map(|other| fit.terms[other.position].clone())
-        .collect();
+    let manoeuvre = (verdict == Verdict::CannotTell).then(|| info.broken_by.to_owned());
     Finding {
         verdict,
-        robots: robots.into_iter().collect(),
+        configuration: corrected::sections(&robots, &own.judged.estimated),
+        robots,
         stage: info.stage.name().to_owned(),
         channel: own.judged.channel.name().to_owned(),
         effect: Some(info.name.to_owned()),
         expression: None,
         expression_units: None,
         support_set,
-        parameters: own.judged.estimated.parameters(),
+        parameters: own.parameters(),
         place: own.judged.place.clone(),
-        p_familywise: own.judged.p_familywise,
+        p_familywise: own.judged.p_familywise.max(f64::MIN_POSITIVE),
         held_out: HeldOut {
             log_score_gain: own.gain.total,
             log_score_gain_se: own.gain.standard_error,
-            rollout_rmse: rolled::of_finding(roller, own, &kept),
+            rollout_rmse: rolled::of_finding(rolled, units, own),
         },
         manoeuvre,
-        summary: info.summary.to_owned(),
+        // Sentences are the reader's: who writes the findings fills this.
+        summary: String::new(),
         equation: Some(info.equation.to_owned()),
-        configuration: corrected::section(&own.judged.estimated),
     }
+}
+
+impl Judgement {
+    fn name(&self) -> &'static str {
+        self.judged.estimated[0].term.effect.name()
+    }
+
+    fn parameters(&self) -> BTreeMap<String, Estimate> {
+        let mut all: BTreeMap<String, Estimate> =
+            self.judged.estimated.iter().flat_map(Estimated::parameters).collect();
+        all.extend(self.judged.total.clone());
+        all
+    }
+}
+
+/// The terms of findings.
+fn kept(fit: &Fit, judgements: &[Judgement]) -> Vec<Term> {
+    let found = judgements.iter().filter(|own| own.judged.verdict.is_some());
+    found.flat_map(|own| own.group.iter().map(|&term| fit.terms[term].clone())).collect()
+}
+
+/// Where lag or delay was found without encoders, both are fitted: only their sum is well known.
+fn paired(units: &[&Unit<'_>], fit: Fit) -> Option<Fit> {
+    let mut terms = fit.terms.clone();
+    for term in &fit.terms {
+        let Some(twin) = twin(term.effect) else { continue };
+        let known = fit.terms.iter().any(|other| other.effect == twin && other.whose == term.whose);
+        if !known && is_unseen(units, term) {
+            let off = twin.info().parameters.iter().map(|parameter| parameter.off).collect();
+            terms.push(Term::new(twin, term.whose, off));
+        }
+    }
+    if terms.len() == fit.terms.len() {
+        return Some(fit);
+    }
+    crate::diagnosis::fit::fit(units, terms, &|_| true, Effort::FULL)
 }
 
 fn overall(findings: &[Finding], units: &[&Unit<'_>]) -> Verdict {
@@ -317,7 +350,9 @@ fn overall(findings: &[Finding], units: &[&Unit<'_>]) -> Verdict {
 /// What is said where nothing could be compared.
 fn nothing(prepared: &[Prepared<'_>], entries: Entries, mut notes: Vec<String>, empty: bool) -> Diagnosis {
     if !empty {
-        notes.push("the nominal model predicts values that are no finite numbers; nothing was fitted".to_owned());
+        notes.push(
+            "the nominal model predicts values that are no finite numbers; nothing was fitted".to_owned(),
+        );
     }
     let findings = Findings {
         verdict: Verdict::Untestable,

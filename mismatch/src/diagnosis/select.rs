@@ -46,6 +46,8 @@ pub(crate) struct Selected {
     pub(crate) fit: Fit,
     /// How many starts were tried: what a probability is multiplied by.
     pub(crate) tests: usize,
+    /// What could be added, linearized beside the terms that were found.
+    pub(crate) pool: Pool,
 }
 
 /// Adds effects from `entries` as long as one is significant; prunes.
@@ -73,7 +75,7 @@ pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry]) -> Option<Selected>
     }
     let current = fit(units, current.terms, &|_| true, Effort::FULL)?;
     let fit = prune(units, current)?;
-    Some(Selected { fit, tests })
+    Some(Selected { fit, tests, pool })
 }
 
 /// Linearized candidates. What is linear enough is kept when terms are added: it serves to choose whom to fit.
@@ -113,6 +115,11 @@ impl Pool {
         scores.into_iter().flatten().collect()
     }
 
+    /// Every candidate, whether or not it adds anything to a fit.
+    pub(crate) fn candidates(&self) -> impl Iterator<Item = &Candidate> {
+        self.known.values().flatten()
+    }
+
     /// Whether every candidate was linearized beside these terms.
     fn is_fresh(&self, terms: &[Term]) -> bool {
         self.terms == Some(terms.len())
@@ -137,11 +144,7 @@ pub(crate) fn whites<'u, 'a>(units: &[&'u Unit<'a>], fit: &'u Fit) -> Vec<White<
     each.map(|((unit, state), columns)| White::new(unit, state, columns)).collect()
 }
 
-pub(crate) fn score(
-    units: &[&Unit<'_>],
-    whites: &[White<'_, '_>],
-    candidate: &Candidate,
-) -> Option<Scored> {
+pub(crate) fn score(units: &[&Unit<'_>], whites: &[White<'_, '_>], candidate: &Candidate) -> Option<Scored> {
     let all = candidate.columns(units);
     let own: Vec<&White<'_, '_>> = all.iter().map(|(unit, _)| &whites[*unit]).collect();
     let columns: Vec<&[_]> = all.iter().map(|(_, columns)| columns.as_slice()).collect();
@@ -218,7 +221,8 @@ fn additions(
     if let Some(gain) = best_shared
         && groups.values().all(|own| own[0].step.gain < gain)
     {
-        return choose(units, whites, current, &shared).into_iter().collect();
+        // What shows on one robot alone may be its own.
+        return choose(units, whites, current, &strong).into_iter().collect();
     }
     // A robot waits if what it shows may be its share of an effect of the world.
     let sharers = units.len().max(1) as f64;
@@ -230,12 +234,7 @@ fn additions(
 }
 
 /// Fits the strongest rivals and gives the best of them, fitted.
-fn choose(
-    units: &[&Unit<'_>],
-    whites: &[White<'_, '_>],
-    current: &Fit,
-    rivals: &[&Scored],
-) -> Option<Fit> {
+fn choose(units: &[&Unit<'_>], whites: &[White<'_, '_>], current: &Fit, rivals: &[&Scored]) -> Option<Fit> {
     let best = rivals.first()?.step.gain;
     let close = rivals.iter().take_while(|rival| rival.step.gain > LEAST_SHARE * best).count();
     let rivals = &rivals[..close.min(RIVALS)];
@@ -243,9 +242,7 @@ fn choose(
     let fitted: Vec<Option<(f64, Fit)>> = parallel::map(rivals, |rival| {
         let rival = refine(units, whites, rival);
         let added = fit_beside(units, current, rival.term())?;
-        let term = added.terms.last()?;
-        let whose = term.whose;
-        term.is_inside().then(|| (criterion(units, &added, inflation, whose), added))
+        added.terms.last()?.is_inside().then(|| (criterion(units, current, &added, inflation), added))
     });
     // Of equals the first: the one whose linearization was the strongest.
     let mut best: Option<(f64, Fit)> = None;
@@ -308,22 +305,27 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
         terms.iter().map(|term| whose == Whose::Everyone || term.whose == whose).collect();
     let known: Vec<State> = own.iter().map(|&unit| current.states[unit].clone()).collect();
     let states = with_another(&acting, &known, &terms)?;
-    fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL)
+    Some(fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL))
 }
 
-/// Bayes' information criterion on the effective sample size; more is better.
-fn criterion(units: &[&Unit<'_>], fit: &Fit, inflation: f64, whose: Whose) -> f64 {
-    let rows: usize = units
-        .iter()
-        .filter(|unit| overlap(whose, Whose::Robot(unit.robot)))
-        .map(|unit| unit.rows.len())
-        .sum();
+/// What a fit with one more term gains by Bayes' information criterion on the effective sample size; more is
+/// better. Rivals may act on other robots.
+fn criterion(units: &[&Unit<'_>], current: &Fit, added: &Fit, inflation: f64) -> f64 {
+    let Some(term) = added.terms.last() else { return f64::NEG_INFINITY };
+    let (mut rows, mut before) = (0, 0.0);
+    for (unit, state) in units.iter().zip(&current.states).filter(|(unit, _)| term.acts_on(unit.robot)) {
+        rows += unit.rows.len();
+        before += state.noise.log_likelihood;
+    }
     let effective = (rows as f64 / inflation).max(2.0);
-    2.0 * fit.log_likelihood / inflation - fit.slots.len() as f64 * effective.ln()
+    2.0 * (added.log_likelihood - before) / inflation - added.parameters_of_last() as f64 * effective.ln()
 }
 
 /// The robust covariance of all fitted parameters, in the order of the slots.
 pub(crate) fn covariance(units: &[&Unit<'_>], fit: &Fit) -> Option<DMatrix<f64>> {
+    if fit.slots.is_empty() {
+        return Some(DMatrix::zeros(0, 0));
+    }
     let bare: Vec<White<'_, '_>> =
         units.iter().zip(&fit.states).map(|(unit, state)| White::new(unit, state, &[])).collect();
     let bare: Vec<&White<'_, '_>> = bare.iter().collect();
@@ -331,19 +333,26 @@ pub(crate) fn covariance(units: &[&Unit<'_>], fit: &Fit) -> Option<DMatrix<f64>>
     Some(step(&bare, &columns)?.covariance)
 }
 
-/// The Wald statistic of a term and its degrees of freedom.
-pub(crate) fn wald(fit: &Fit, covariance: &DMatrix<f64>, term: usize) -> Option<(f64, usize)> {
-    let own: Vec<usize> = (0..fit.slots.len()).filter(|&slot| fit.slots[slot].0 == term).collect();
-    let parameters = fit.terms[term].parameters();
-    // A term whose size shows in no derivative, such as an onset, cannot be tested this way.
-    let own: Vec<usize> = own.into_iter().filter(|&slot| parameters[fit.slots[slot].1].off.is_finite()).collect();
+/// The Wald statistic of terms and its degrees of freedom.
+pub(crate) fn wald(fit: &Fit, covariance: &DMatrix<f64>, terms: &[usize]) -> Option<(f64, usize)> {
+    let parameter = |slot: usize| {
+        let (term, parameter) = fit.slots[slot];
+        (fit.terms[term].values[parameter], &fit.terms[term].parameters()[parameter])
+    };
+    // A parameter that is off at infinity, or only shapes an effect, says nothing of its presence.
+    let says = |slot: &usize| {
+        let (_, parameter) = parameter(*slot);
+        parameter.off.is_finite() && (parameter.off == 0.0 || fit.slots.len() == 1)
+    };
+    let own: Vec<usize> =
+        (0..fit.slots.len()).filter(|&slot| terms.contains(&fit.slots[slot].0)).filter(says).collect();
     if own.is_empty() {
         return None;
     }
     let part = DMatrix::from_fn(own.len(), own.len(), |i, j| covariance[(own[i], own[j])]);
     let value = |slot: usize| {
-        let (term, parameter) = fit.slots[slot];
-        fit.terms[term].values[parameter] - parameters[parameter].off
+        let (value, parameter) = parameter(slot);
+        value - parameter.off
     };
     let values = nalgebra::DVector::from_fn(own.len(), |i, _| value(own[i]));
     Some((values.dot(&part.cholesky()?.solve(&values)), own.len()))
@@ -355,7 +364,7 @@ fn prune(units: &[&Unit<'_>], mut current: Fit) -> Option<Fit> {
         let Some(covariance) = covariance(units, &current) else { return Some(current) };
         let weakest = (0..current.terms.len())
             .filter_map(|term| {
-                let (wald, count) = wald(&current, &covariance, term)?;
+                let (wald, count) = wald(&current, &covariance, &[term])?;
                 Some((upper_tail(wald, count), term))
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));

@@ -25,6 +25,7 @@ pub(crate) fn plots(
             for component in 0..stretch.components {
                 let indices = || stretch.range().skip(component).step_by(stretch.components);
                 plots.residuals.push(ResidualSeries {
+                    recording: prepared[unit.recording].recording.name.clone(),
                     robot: unit.robot.0,
                     channel: stretch.channel,
                     component,
@@ -41,7 +42,8 @@ pub(crate) fn plots(
     }
     for (finding, own) in found.iter().enumerate() {
         for (position, &unit) in own.support.units.iter().enumerate() {
-            partial(finding, own, position, units[unit], &mut plots.partial);
+            let recording = &prepared[units[unit].recording].recording.name;
+            partial(finding, own, position, (units[unit], recording), &mut plots.partial);
         }
     }
     for own in prepared {
@@ -62,18 +64,26 @@ pub(crate) fn plots(
 }
 
 /// The partial residuals of a finding in the channel that shows it most, component by component.
-fn partial(finding: usize, own: &Judgement, position: usize, unit: &Unit<'_>, all: &mut Vec<PartialResidual>) {
+fn partial(
+    finding: usize,
+    own: &Judgement,
+    position: usize,
+    (unit, recording): (&Unit<'_>, &str),
+    all: &mut Vec<PartialResidual>,
+) {
     let (with, without) = (&own.support.with.states[position], &own.support.without.states[position]);
     let Some(stretch) = unit.stretch(own.judged.channel) else { return };
     let gain = gain(unit, with, without);
     for component in 0..stretch.components {
         let indices = || stretch.range().skip(component).step_by(stretch.components);
-        let predicted: Vec<f64> = indices().map(|index| without.residuals[index] - with.residuals[index]).collect();
+        let predicted: Vec<f64> =
+            indices().map(|index| without.residuals[index] - with.residuals[index]).collect();
         if predicted.iter().all(|value| *value == 0.0) {
             continue;
         }
         all.push(PartialResidual {
             finding,
+            recording: recording.to_owned(),
             robot: unit.robot.0,
             channel: stretch.channel,
             component,

@@ -17,7 +17,10 @@ const ONSETS: usize = 24;
 /// Cells per side of the map in which a place is searched, coarse and fine.
 const CELLS: [usize; 3] = [2, 4, 7];
 /// Values of a threshold that are tried.
-const THRESHOLDS: usize = 40;
+const THRESHOLDS: usize = 24;
+/// A change of command takes at least this long to follow, seconds: what bounds an acceleration limit that
+/// can act.
+const SHORTEST_STEP_S: f64 = 0.02;
 /// Beyond every place and before every time.
 const EVERYWHERE: f64 = 1e9;
 /// Values of a delay or lag that are tried, seconds.
@@ -57,6 +60,11 @@ impl Placing {
         }
     }
 
+    /// How many parameters say it.
+    pub(crate) fn count(self) -> usize {
+        usize::from(self.onset.is_some()) + 4 * usize::from(self.region.is_some())
+    }
+
     pub(crate) fn is_some(self) -> bool {
         self.onset.is_some() || self.region.is_some()
     }
@@ -77,7 +85,8 @@ enum Choices {
 /// Starts of an effect for units that it would act on; onset and region are left at "off".
 pub(crate) fn starts(effect: Effect, units: &[&Unit<'_>]) -> Vec<Start> {
     let info = effect.info();
-    let choices: Vec<Choices> = info.parameters.iter().map(|parameter| choices(info, parameter, units)).collect();
+    let choices: Vec<Choices> =
+        info.parameters.iter().map(|parameter| choices(info, parameter, units)).collect();
     let off: Vec<f64> = info.parameters.iter().map(|parameter| parameter.off).collect();
     let amplitudes: Vec<usize> =
         (0..choices.len()).filter(|&index| matches!(choices[index], Choices::Amplitude)).collect();
@@ -133,7 +142,7 @@ fn choices(info: &EffectInfo, parameter: &Parameter, units: &[&Unit<'_>]) -> Cho
         (Fit::Choice, _, _) => Choices::Of(integers(least, greatest)),
         // A delay is smooth: it has a derivative and, like a lag, starts far from zero.
         (Fit::Grid, "delay_s", _) => Choices::Amplitude,
-        (Fit::Grid, _, _) => Choices::Threshold(thresholds(parameter)),
+        (Fit::Grid, _, _) => Choices::Threshold(thresholds(parameter, units)),
         (Fit::Smooth, _, _) if !is_shape(info, parameter) => Choices::Amplitude,
         (Fit::Smooth, _, _) if parameter.unit == "rad" => {
             // The amplitude may be negative, so half a period is enough.
@@ -214,10 +223,25 @@ fn integers(least: f64, greatest: f64) -> Vec<f64> {
     values
 }
 
-/// Evenly spaced logarithms over what is plausible.
-fn thresholds(parameter: &Parameter) -> Vec<f64> {
-    let greatest = parameter.plausible.1;
-    let least = parameter.plausible.0.max(greatest / 300.0);
-    let ratio = (greatest / least).powf(1.0 / (THRESHOLDS - 1) as f64);
+/// Evenly spaced logarithms over what is plausible and could act: a limit cannot act above all that the
+/// wheels are asked for, a threshold not above it either.
+pub(crate) fn thresholds(parameter: &Parameter, units: &[&Unit<'_>]) -> Vec<f64> {
+    let demand = units
+        .iter()
+        .map(|unit| match parameter.unit {
+            "rad/s" => unit.demand.wheel_rad_s,
+            "m/s" => unit.demand.speed_m_s,
+            "m/s^2" => unit.demand.change_m_s / SHORTEST_STEP_S,
+            _ => f64::INFINITY,
+        })
+        .fold(0.0, f64::max);
+    let greatest = parameter.plausible.1.min(demand);
+    // A limit far below what is asked for would stop the robot; a threshold may be small.
+    let range = if parameter.off.is_finite() { 60.0 } else { 8.0 };
+    let least = parameter.plausible.0.max(greatest / range);
+    if greatest.partial_cmp(&least) != Some(std::cmp::Ordering::Greater) {
+        return Vec::new();
+    }
+    let ratio = (greatest / least).powf(1.0 / THRESHOLDS as f64);
     (0..THRESHOLDS).map(|step| least * ratio.powi(i32::try_from(step).unwrap_or(0))).collect()
 }

@@ -45,6 +45,35 @@ pub(crate) struct Row {
     pub(crate) agitation: f64,
 }
 
+/// The most that commands ask for.
+#[derive(Clone, Copy, Debug, Default)]
+#[allow(clippy::struct_field_names, reason = "every field is a rate and ends in its unit")]
+pub(crate) struct Demand {
+    /// Of a wheel, rad/s.
+    pub(crate) wheel_rad_s: f64,
+    /// Of the body, m/s.
+    pub(crate) speed_m_s: f64,
+    /// From one command to the next, m/s.
+    pub(crate) change_m_s: f64,
+}
+
+impl Demand {
+    fn of(evidence: &Evidence<'_>, robot: RobotId, nominal: &RobotModel<f64>) -> Self {
+        let mut demand = Self::default();
+        let Some((_, track)) = evidence.robot(robot) else { return demand };
+        let mut before_m_s = 0.0;
+        for command in &track.commands {
+            let rim_m_s =
+                command.speed_m_s.abs() + 0.5 * nominal.nominal.track_width * command.yaw_rate_rad_s.abs();
+            demand.wheel_rad_s = demand.wheel_rad_s.max(rim_m_s / nominal.nominal.wheel_radius);
+            demand.speed_m_s = demand.speed_m_s.max(rim_m_s);
+            demand.change_m_s = demand.change_m_s.max((command.speed_m_s - before_m_s).abs());
+            before_m_s = command.speed_m_s;
+        }
+        demand
+    }
+}
+
 /// One robot in one recording.
 pub(crate) struct Unit<'a> {
     pub(crate) evidence: &'a Evidence<'a>,
@@ -65,6 +94,8 @@ pub(crate) struct Unit<'a> {
     pub(crate) blocks: usize,
     /// First and last stamp, seconds.
     pub(crate) span_s: (f64, f64),
+    /// The most that commands ask for.
+    pub(crate) demand: Demand,
 }
 
 /// Residuals of the channels asked for; the others are `None`.
@@ -96,6 +127,7 @@ impl<'a> Unit<'a> {
         floors: Floors,
         jitter_sigma_s: f64,
     ) -> Self {
+        let demand = Demand::of(evidence, robot, &nominal);
         let mut unit = Self {
             evidence,
             recording,
@@ -109,6 +141,7 @@ impl<'a> Unit<'a> {
             block_of: Vec::new(),
             blocks: 0,
             span_s: (0.0, 0.0),
+            demand,
         };
         for channel in Channel::ALL {
             let found = residuals_of(evidence, robot, &unit.nominal, channel);
@@ -230,8 +263,11 @@ impl<'a> Unit<'a> {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "times since the first, at least 0")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "times since the first, at least 0"
+)]
 fn block(since_s: f64) -> usize {
     (since_s / BLOCK_S) as usize
 }
-

@@ -27,8 +27,8 @@ impl<S: Scalar> Default for BodyState<S> {
 /// What a step adds to a pose, and the mean velocities in it.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyIncrement<S> {
-    /// Driven, in the frame of the robot at the beginning.
-    pub driven: Pose<S>,
+    /// Driven at a constant velocity of the body, in its frame: forward and left (metres), yaw (radians).
+    pub driven: [S; 3],
     /// What the surroundings add, in the map.
     pub added: MapMotion<S>,
     /// Mean forward speed, m/s.
@@ -42,10 +42,20 @@ pub struct BodyIncrement<S> {
 impl<S: Scalar> BodyIncrement<S> {
     /// The pose at the end of a step that began at `start`.
     pub fn applied_to(&self, start: &Pose<S>) -> Pose<S> {
-        let mut pose = start.compose(&self.driven);
-        pose.x_m += self.added.shift_m[0];
-        pose.y_m += self.added.shift_m[1];
-        pose.yaw_rad += self.added.yaw_rad;
+        let [forward_m, left_m, yaw_rad] = self.driven;
+        self.added_to(start.compose(&Pose::exp(forward_m, left_m, yaw_rad)), S::one())
+    }
+
+    /// The pose after a share of the step; before the step that ended at `start`, if the share is negative.
+    pub fn share_applied_to(&self, start: &Pose<S>, share: S) -> Pose<S> {
+        let [forward_m, left_m, yaw_rad] = self.driven.map(|part| part * share);
+        self.added_to(start.compose(&Pose::exp(forward_m, left_m, yaw_rad)), share)
+    }
+
+    fn added_to(&self, mut pose: Pose<S>, share: S) -> Pose<S> {
+        pose.x_m += self.added.shift_m[0] * share;
+        pose.y_m += self.added.shift_m[1] * share;
+        pose.yaw_rad += self.added.yaw_rad * share;
         pose
     }
 }
@@ -116,7 +126,7 @@ pub fn increment<S: Scalar>(
 
     state.speed_m_s = Some(speed);
     BodyIncrement {
-        driven: Pose::exp(body.forward_m, body.left_m, body.yaw_rad),
+        driven: [body.forward_m, body.left_m, body.yaw_rad],
         added,
         speed_m_s: body.forward_m / step_s,
         yaw_rate_rad_s: (body.yaw_rad + added.yaw_rad) / step_s,
@@ -124,10 +134,27 @@ pub fn increment<S: Scalar>(
     }
 }
 
+/// Where the nominal robot is in the middle of a step in which its wheels turn by these angles.
+pub(crate) fn nominal_middle<S: Scalar>(
+    model: &RobotModel<S>,
+    context: &Context<S>,
+    turned_rad: [S; 2],
+) -> Pose<S> {
+    let rolled_m = turned_rad.map(|turned| model.nominal.wheel_radius * turned);
+    let (forward_m, yaw_rad) = kinematics(model.drive, context, &nominal_geometry(model), rolled_m);
+    context.motion.pose.compose(&Pose::exp(forward_m * 0.5, S::zero(), yaw_rad * 0.5))
+}
+
 /// The robot as its wheels see it.
 fn geometry<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> Geometry<S> {
+    let mut geometry = nominal_geometry(model);
+    model.apply(context, |effect, values| effect.geometry(values, context, &mut geometry));
+    geometry
+}
+
+fn nominal_geometry<S: Scalar>(model: &RobotModel<S>) -> Geometry<S> {
     let nominal = &model.nominal;
-    let mut geometry = Geometry {
+    Geometry {
         wheel_radius_m: [nominal.wheel_radius; 2],
         track_width_m: match model.drive {
             Drive::SkidSteer { track_ratio } => nominal.track_width * track_ratio,
@@ -135,9 +162,7 @@ fn geometry<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> Geometry<
         },
         steer_offset_rad: S::zero(),
         understeer_s2_per_m2: S::zero(),
-    };
-    model.apply(context, |effect, values| effect.geometry(values, context, &mut geometry));
-    geometry
+    }
 }
 
 /// Forward distance and yaw: `(left + right)/2`, and `(right - left)/b`, or for a car the distance times

@@ -1,7 +1,7 @@
 //! The motion of the body, predicted from encoders.
 
 use crate::chain::actuator::{Scheduled, turn};
-use crate::chain::body::{BodyState, advance};
+use crate::chain::body::{BodyIncrement, BodyState, advance, increment, nominal_middle};
 use crate::chain::robot::Robot;
 use crate::chain::sensors;
 use crate::context::{Context, Motion, Surroundings};
@@ -25,11 +25,14 @@ pub struct EncoderSample {
     pub steer_rad: f64,
 }
 
-/// Encoder samples from the beginning to the end of a window.
+/// A window between two encoder samples.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyWindow<'a> {
-    /// At least two, at increasing times.
-    pub samples: &'a [EncoderSample],
+    /// Samples at increasing times without a pause: those of the window, and those around it along which
+    /// reference poses are carried to its ends.
+    pub track: &'a [EncoderSample],
+    /// Positions of the first and the last sample of the window.
+    pub ends: [usize; 2],
     /// `map_from_robot` at the beginning, for effects that depend on heading or place: from truth, or from
     /// the filter.
     pub start: Pose<f64>,
@@ -37,24 +40,60 @@ pub struct BodyWindow<'a> {
     pub surroundings: Surroundings,
 }
 
-impl BodyWindow<'_> {
+impl<'a> BodyWindow<'a> {
+    /// From the first to the last of these samples, with nothing known around them.
+    pub fn whole(samples: &'a [EncoderSample], start: Pose<f64>, surroundings: Surroundings) -> Self {
+        Self { track: samples, ends: [0, samples.len().saturating_sub(1)], start, surroundings }
+    }
+
+    fn samples(&self) -> &'a [EncoderSample] {
+        self.track.get(self.ends[0]..=self.ends[1]).unwrap_or_default()
+    }
+
+    /// The stamps of the first and the last sample, seconds.
+    pub fn stamps_s(&self) -> [f64; 2] {
+        self.ends.map(|end| self.track.get(end).map_or(0.0, |sample| sample.time_s))
+    }
+
     fn duration_s(&self) -> f64 {
-        match (self.samples.first(), self.samples.last()) {
-            (Some(first), Some(last)) => last.time_s - first.time_s,
-            _ => 0.0,
-        }
+        let [from_s, to_s] = self.stamps_s();
+        to_s - from_s
     }
 
     fn middle_s(&self) -> f64 {
-        self.samples.first().map_or(0.0, |first| first.time_s) + 0.5 * self.duration_s()
+        self.stamps_s()[0] + 0.5 * self.duration_s()
+    }
+
+    /// The robot at a pose, as its wheels begin a step.
+    fn step<S: Scalar>(
+        &self,
+        model: &RobotModel<S>,
+        [from, to]: [&EncoderSample; 2],
+        pose: Pose<S>,
+        state: &mut BodyState<S>,
+    ) -> BodyIncrement<S> {
+        let turned = [0, 1].map(|wheel| S::constant(to.angle_rad[wheel] - from.angle_rad[wheel]));
+        let mut motion = Motion::at_rest(pose);
+        motion.wheel_angle_rad = from.angle_rad.map(S::constant);
+        let steer_rad = f64::midpoint(from.steer_rad, to.steer_rad);
+        let mut context = Context {
+            surroundings: Surroundings { steer_rad, ..self.surroundings },
+            ..Context::new(&model.nominal, from.time_s, motion).over(S::constant(to.time_s - from.time_s))
+        };
+        // Effects of heading and place act as in the middle of the step.
+        context.motion.pose = nominal_middle(model, &context, turned);
+        increment(model, &context, turned, state)
     }
 }
 
 /// What a window was rolled out to.
 struct Rollout<S> {
+    start: Pose<S>,
     end: Pose<S>,
-    first: Motion<S>,
-    last: Motion<S>,
+    /// Of the last step.
+    motion: Motion<S>,
+    /// The state of the body at the beginning.
+    before: BodyState<S>,
 }
 
 fn roll_out<S: Scalar>(
@@ -63,28 +102,19 @@ fn roll_out<S: Scalar>(
     state: &mut BodyState<S>,
 ) -> Rollout<S> {
     let start: Pose<S> = Pose::constant(window.start.x_m, window.start.y_m, window.start.yaw_rad);
+    let before = *state;
     let mut motion = Motion::at_rest(start);
-    let mut first = None;
-    for pair in window.samples.windows(2) {
-        let step_s = pair[1].time_s - pair[0].time_s;
-        if step_s <= 0.0 {
+    for pair in window.samples().windows(2) {
+        if pair[1].time_s <= pair[0].time_s {
             continue;
         }
-        motion.wheel_angle_rad = pair[0].angle_rad.map(S::constant);
-        let turned = [0, 1].map(|wheel| S::constant(pair[1].angle_rad[wheel] - pair[0].angle_rad[wheel]));
-        let steer_rad = f64::midpoint(pair[0].steer_rad, pair[1].steer_rad);
-        let context = Context {
-            surroundings: Surroundings { steer_rad, ..window.surroundings },
-            ..Context::new(&model.nominal, pair[0].time_s, motion).over(S::constant(step_s))
-        };
-        let step = advance(model, &context, turned, state);
-        motion.pose = step.pose;
+        let step = window.step(model, [&pair[0], &pair[1]], motion.pose, state);
+        motion.pose = step.applied_to(&motion.pose);
         motion.speed_m_s = step.speed_m_s;
         motion.yaw_rate_rad_s = step.yaw_rate_rad_s;
         motion.acceleration_m_s2 = step.acceleration_m_s2;
-        first.get_or_insert(Motion { pose: start, ..motion });
     }
-    Rollout { end: motion.pose, first: first.unwrap_or(motion), last: motion }
+    Rollout { start, end: motion.pose, motion, before }
 }
 
 /// The motion of the axle midpoint over the window, in the frame of its beginning. Run windows in order:
@@ -95,23 +125,83 @@ pub fn body_motion<S: Scalar>(
     state: &mut BodyState<S>,
 ) -> Pose<S> {
     let rollout = roll_out(model, window, state);
-    rollout.first.pose.between(&rollout.end)
+    rollout.start.between(&rollout.end)
 }
 
-/// The motion that the reference system sees between the window's stamps: of its marker, as late as it is,
-/// and by its own clock.
+/// The motion that the reference system sees between two reference poses with these stamps, near the ends
+/// of the window: of its marker, as late as it is, and by its own clock.
 ///
-/// The encoders' window is `e` (the clock error) earlier in common time than its stamps say, and a reference
-/// pose is `L` older than its stamp; both ends are carried by `e - L` with the motion measured there.
+/// A robot's clock that is ahead by `e` stamps a sample `e` too late, and a reference pose is `L` older than
+/// its stamp: a reference pose stamped `s` is of the robot's stamp `s + e - L`. To there the window's ends are
+/// carried along the encoders, so that the derivative by `e - L` is the velocity then.
 pub fn truth_change<S: Scalar>(
     model: &RobotModel<S>,
     window: &BodyWindow<'_>,
+    stamps_s: [f64; 2],
     state: &mut BodyState<S>,
 ) -> Pose<S> {
     let rollout = roll_out(model, window, state);
-    let [first_s, last_s] =
-        [window.samples.first(), window.samples.last()].map(|sample| sample.map_or(0.0, |own| own.time_s));
-    seen_by_truth(model, rollout.first, first_s).between(&seen_by_truth(model, rollout.last, last_s))
+    let first = seen_after(model, window, (0, rollout.start, &rollout.before), stamps_s[0]);
+    let last = seen_after(model, window, (1, rollout.end, state), stamps_s[1]);
+    first.between(&last)
+}
+
+/// The reference pose stamped `stamp_s`, from the pose at one end of a window.
+fn seen_after<S: Scalar>(
+    model: &RobotModel<S>,
+    window: &BodyWindow<'_>,
+    (end, pose, state): (usize, Pose<S>, &BodyState<S>),
+    stamp_s: f64,
+) -> Pose<S> {
+    let at_s = window.stamps_s()[end];
+    let context = Context::new(&model.nominal, at_s, Motion::at_rest(pose));
+    let reading = sensors::truth_reading(model, &context);
+    let ahead_s = sensors::clock_error_s(model, &context) - reading.latency_s + (stamp_s - at_s);
+    let then = carried(model, window, (window.ends[end], pose, state), ahead_s);
+    then.compose(&sensors::marker(&reading))
+}
+
+/// Where the robot is `ahead_s` after a sample of the encoders (before it, if negative): along them as far
+/// as they go, then at the velocity of the last step, which may be the other way.
+fn carried<S: Scalar>(
+    model: &RobotModel<S>,
+    window: &BodyWindow<'_>,
+    (mut at, mut pose, state): (usize, Pose<S>, &BodyState<S>),
+    ahead_s: S,
+) -> Pose<S> {
+    let mut state = *state;
+    let mut rest_s = ahead_s;
+    let forth = ahead_s.value() >= 0.0;
+    let sense = if forth { 1.0 } else { -1.0 };
+    let mut last: Option<[usize; 2]> = None;
+    loop {
+        let next = if forth { at.checked_add(1) } else { at.checked_sub(1) };
+        let Some((next, there)) = next.and_then(|next| Some((next, window.track.get(next)?))) else {
+            let behind = if forth { at.checked_sub(1).map(|from| [from, at]) } else { Some([at, at + 1]) };
+            let samples =
+                last.or(behind).and_then(|[from, to]| Some([window.track.get(from)?, window.track.get(to)?]));
+            return match samples {
+                Some([from, to]) if to.time_s > from.time_s => {
+                    let step = window.step(model, [from, to], pose, &mut state);
+                    step.share_applied_to(&pose, rest_s / (to.time_s - from.time_s))
+                }
+                _ => pose,
+            };
+        };
+        let here = &window.track[at];
+        let step_s = (there.time_s - here.time_s).abs();
+        if step_s > 0.0 {
+            let ends = if forth { [here, there] } else { [there, here] };
+            let step = window.step(model, ends, pose, &mut state);
+            if rest_s.value().abs() < step_s {
+                return step.share_applied_to(&pose, rest_s / step_s);
+            }
+            pose = step.share_applied_to(&pose, S::constant(sense));
+            last = Some([at.min(next), at.max(next)]);
+            rest_s -= S::constant(sense * step_s);
+        }
+        at = next;
+    }
 }
 
 /// The reference pose whose stamp equals the robot's stamp `time_s` of this motion.
@@ -177,10 +267,10 @@ fn drive<S: Scalar>(
 /// The mean yaw rate that the gyro reads over the window, rad/s.
 pub fn mean_gyro<S: Scalar>(model: &RobotModel<S>, window: &BodyWindow<'_>, state: &mut BodyState<S>) -> S {
     let rollout = roll_out(model, window, state);
-    let mut motion = rollout.last;
+    let mut motion = rollout.motion;
     let duration_s = window.duration_s();
     if duration_s > 0.0 {
-        motion.yaw_rate_rad_s = (rollout.end.yaw_rad - rollout.first.pose.yaw_rad) / duration_s;
+        motion.yaw_rate_rad_s = (rollout.end.yaw_rad - rollout.start.yaw_rad) / duration_s;
     }
     let context = Context::new(&model.nominal, window.middle_s(), motion);
     sensors::gyro(model, &context, &mut S::zero())
@@ -208,12 +298,8 @@ mod tests {
     #[test]
     fn a_nominal_window_is_an_arc() {
         let samples = circle();
-        let window = BodyWindow {
-            samples: &samples,
-            start: Pose::new(3.0, 1.0, 2.0),
-            surroundings: Surroundings::default(),
-        };
-        let change = truth_change(&model(), &window, &mut BodyState::default());
+        let window = BodyWindow::whole(&samples, Pose::new(3.0, 1.0, 2.0), Surroundings::default());
+        let change = truth_change(&model(), &window, window.stamps_s(), &mut BodyState::default());
         assert!((change.x_m - 0.5 * 1.0_f64.sin()).abs() < 1e-12);
         assert!((change.y_m - 0.5 * (1.0 - 1.0_f64.cos())).abs() < 1e-12);
         assert!((change.yaw_rad - 1.0).abs() < 1e-12);
@@ -236,8 +322,7 @@ mod tests {
     #[test]
     fn nominal_parameters_are_differentiated_like_effects() {
         let samples = circle();
-        let window =
-            BodyWindow { samples: &samples, start: Pose::identity(), surroundings: Surroundings::default() };
+        let window = BodyWindow::whole(&samples, Pose::identity(), Surroundings::default());
         let variables = [NominalParameter::WheelRadius, NominalParameter::TrackWidth].map(Variable::Nominal);
         let model = model().differentiated(&variables);
         let yaw = body_motion(&model, &window, &mut BodyState::default()).yaw_rad;

@@ -9,4 +9,4 @@ mod sensors;
 
 pub use actuator::{CommandWindow, wheel_turns};
 pub use body::{BodyWindow, EncoderSample, body_motion, commanded_truth_change, mean_gyro, truth_change};
-pub use sensors::{Instant, gps, heading, sighting, truth};
+pub use sensors::{Anchor, Instant, Path, gps, heading, sighting, truth};

@@ -7,8 +7,8 @@ use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::chain::robot::Robot;
 use pleiad_physics::chain::sensors::{self, Seen};
 use pleiad_physics::predict::{
-    BodyWindow, CommandWindow, EncoderSample, Instant, body_motion, commanded_truth_change, gps, heading,
-    mean_gyro, sighting, truth, truth_change, wheel_turns,
+    Anchor, BodyWindow, CommandWindow, EncoderSample, Instant, Path, body_motion, commanded_truth_change,
+    gps, heading, mean_gyro, sighting, truth, truth_change, wheel_turns,
 };
 use pleiad_physics::signal::Target;
 use pleiad_physics::{Chance, Context, Drive, Motion, Nominal, Pose, RobotModel, Scalar, Surroundings};
@@ -138,19 +138,48 @@ fn body<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
     let mut states = [BodyState::default(); 3];
     for (first, from_s) in (0..150).step_by(25).zip(instants(6, 0.5)) {
         let window = BodyWindow {
-            samples: &samples[first..=first + 25],
+            track: &samples,
+            ends: [first, first + 25],
             start: motion(from_s).pose,
             surroundings: surroundings(from_s),
         };
+        // Reference poses between samples, by a different way at each end.
+        let [first_s, last_s] = window.stamps_s();
+        let stamps_s = [first_s - 0.007, last_s + 0.004];
         push_pose(out, &format!("body {from_s:.2}"), body_motion(model, &window, &mut states[0]));
-        push_pose(out, &format!("truth change {from_s:.2}"), truth_change(model, &window, &mut states[1]));
+        push_pose(
+            out,
+            &format!("truth change {from_s:.2}"),
+            truth_change(model, &window, stamps_s, &mut states[1]),
+        );
         out.push((format!("gyro {from_s:.2}"), mean_gyro(model, &window, &mut states[2])));
     }
 }
 
+/// A circle, driven at constant velocity.
+struct Circle;
+
+impl Path for Circle {
+    fn motion_at(&self, time_s: f64) -> Option<Motion<f64>> {
+        let (speed, yaw_rate) = (0.4, 0.5);
+        let mut motion = Motion::at_rest(Pose::exp(speed * time_s, 0.0, yaw_rate * time_s));
+        (motion.speed_m_s, motion.yaw_rate_rad_s) = (speed, yaw_rate);
+        Some(motion)
+    }
+}
+
+/// An instant of a reading; every other one is near a reference pose.
+fn instant(time_s: f64, anchored: bool) -> Instant<'static> {
+    let motion = motion(time_s);
+    let on_path = [time_s - 0.008, time_s].map(|stamp_s| Circle.motion_at(stamp_s).unwrap());
+    let anchor = Anchor { time_s: time_s - 0.008, pose: motion.pose, path: &Circle, on_path };
+    let anchor = anchored.then_some(anchor);
+    Instant { time_s, motion, surroundings: surroundings(time_s), anchor, target: None }
+}
+
 fn readings<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
-    for time_s in instants(6, 0.55) {
-        let instant = Instant { time_s, motion: motion(time_s), surroundings: surroundings(time_s) };
+    for (position, time_s) in instants(6, 0.55).enumerate() {
+        let instant = instant(time_s, position % 2 == 1);
         let [x, y] = gps(model, &instant);
         out.push((format!("gps x {time_s:.2}"), x));
         out.push((format!("gps y {time_s:.2}"), y));
@@ -159,6 +188,9 @@ fn readings<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
         let partner = Seen { target: Target::Robot(3), position_m: [2.0, -0.5], velocity_m_s: [0.1, 0.2] };
         for seen in [Seen::landmark(1, [2.5, 1.0]), Seen::landmark(2, [1.5, 2.0]), partner] {
             let name = format!("{:?} {time_s:.2}", seen.target);
+            let path: &dyn Path = &Circle;
+            let target = matches!(seen.target, Target::Robot(_)).then_some(path);
+            let instant = Instant { target: target.filter(|_| position % 2 == 1), ..instant };
             let sighting = sighting(model, &instant, &seen);
             out.push((format!("range {name}"), sighting.range_m));
             out.push((format!("bearing {name}"), sighting.bearing_rad));

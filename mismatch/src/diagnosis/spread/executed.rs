@@ -270,11 +270,12 @@ fn changes(unit: &Unit<'_>, track: &Track, model: &RobotModel<f64>, latency_s: f
         track.commands.iter().map(|command| target(track, model, command, latency_s)).collect()
     };
     let (targets, plain) = (targets(model), targets(&unit.nominal));
-    let change = |((pair, targets), plain): ((&[Command], &[[f64; 2]]), &[[f64; 2]])| {
-        let time_s = pair[1].time_s;
+    let change = |index: usize| {
+        let time_s = track.commands[index].time_s;
         let next = stamps.partition_point(|stamp_s| *stamp_s <= time_s);
-        let by = |targets: &[[f64; 2]]| [0, 1].map(|part: usize| targets[1][part] - targets[0][part]);
-        let (by, plain) = (by(targets), by(plain));
+        let by =
+            |targets: &[[f64; 2]]| [0, 1].map(|part: usize| targets[index][part] - targets[index - 1][part]);
+        let (by, plain) = (by(&targets), by(&plain));
         let size = |by: [f64; 2]| by[0].hypot(0.5 * by[1]);
         Change {
             acts_s: time_s + latency_s,
@@ -283,7 +284,7 @@ fn changes(unit: &Unit<'_>, track: &Track, model: &RobotModel<f64>, latency_s: f
             late_s: stamps.get(next).map(|next_s| next_s - time_s).filter(|late_s| *late_s < GAP_S),
         }
     };
-    track.commands.windows(2).zip(targets.windows(2)).zip(plain.windows(2)).map(change).collect()
+    (1..track.commands.len()).map(change).collect()
 }
 
 /// What a command asks of the wheels under a model: their mean, and right minus left, rad/s.

@@ -33,7 +33,8 @@ pub(super) fn judged(family: &Family<'_, '_>, shows: &Shows, robot: RobotId, tes
     let verdict =
         (p_familywise < FAMILYWISE && relevant && useful).then(|| verdict(member.effect, support.len()));
     let judged = Judged {
-        estimated,
+        estimated: vec![estimated],
+        total: None,
         verdict,
         p_familywise,
         channel: channel(member.effect, shows.channel),

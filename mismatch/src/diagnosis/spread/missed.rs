@@ -10,13 +10,12 @@
 //! The instants are the stamps of sightings, and those between them where the sensor's period says that it
 //! looked and saw nothing.
 
-use pleiad_physics::predict::{self, Instant};
 use pleiad_physics::{Effect, RobotModel};
 
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
-use crate::diagnosis::spread::scans::{CHANNELS, Scan, actual, in_view, scans, targets};
+use crate::diagnosis::spread::scans::{CHANNELS, Scan, actual, in_view, predicted, scans, targets};
 use crate::diagnosis::unit::Unit;
 use crate::sensors::At;
 use crate::track::median_step;
@@ -149,15 +148,14 @@ fn collect(
     let margins = sigmas.map(|sigma| MARGIN_SIGMAS * sigma);
     for (time_s, scan) in instants(unit, &own) {
         let Some(at) = At::new(unit.evidence, unit.robot, track, time_s) else { continue };
-        let instant: &Instant = &at.instant;
         for (target, seen) in targets(unit, kind, time_s) {
-            if !in_view(unit, model, instant, &seen, margins) {
+            if !in_view(unit, model, &at, &seen, margins) {
                 continue;
             }
-            let predicted = predict::sighting(model, instant, &seen);
+            let predicted = predicted(unit, model, &at, &seen);
             let reported = scan.is_some_and(|scan| {
                 scan.readings.iter().any(|reading| {
-                    let (errors, _) = reading.errors(model, &seen);
+                    let (errors, _) = reading.errors(unit, model, &seen);
                     let near = |(error, sigma): (&Option<f64>, f64)| {
                         error.is_none_or(|error| error.abs() < GATE * sigma)
                     };

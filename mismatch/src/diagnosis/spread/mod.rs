@@ -144,7 +144,7 @@ impl Group {
         match self {
             Self::Sightings => {
                 let mut all = of_family(&|units| sighted::family(units, fit));
-                let mixed = all.terms.iter().map(|own| &own.judged.estimated.term);
+                let mixed = all.terms.iter().map(|own| &own.judged.estimated[0].term);
                 let mixed =
                     mixed.filter(|term| term.effect == Effect::IdentityMixUp).map(|term| term.values[0]);
                 let displaced = sighted::displaced(units, mixed.sum());
@@ -234,7 +234,7 @@ fn explained(family: &Family<'_, '_>, shows: &[Shows], terms: &[SpreadTerm], fit
     for shows in shows {
         let effect = family.members[shows.member].effect;
         let is_finding =
-            |own: &SpreadTerm| own.judged.estimated.term.effect == effect && own.judged.verdict.is_some();
+            |own: &SpreadTerm| own.judged.estimated[0].term.effect == effect && own.judged.verdict.is_some();
         if !terms.iter().any(is_finding) {
             continue;
         }

@@ -1,6 +1,6 @@
 //! What the stage says, in the form of findings.
 
-use crate::diagnosis::corrected::section;
+use crate::diagnosis::corrected::sections;
 use crate::diagnosis::run::Judgement;
 use crate::diagnosis::spread::{Explained, Spread, SpreadTerm};
 use crate::findings::{Finding, HeldOut, Verdict};
@@ -9,8 +9,8 @@ impl Spread {
     /// Takes from terms of the mean what an effect of spread explains of them; says so.
     pub(crate) fn explain(&self, judgements: &mut [Judgement], notes: &mut Vec<String>) {
         for &Explained { position, by, part } in &self.explained {
-            for own in judgements.iter_mut().filter(|own| own.position == position) {
-                let term = &mut own.judged.estimated.term;
+            for own in judgements.iter_mut().filter(|own| own.group.contains(&position)) {
+                let term = &mut own.judged.estimated[0].term;
                 let name = term.effect.name();
                 if let Some(part) = part {
                     term.values[0] -= part;
@@ -39,24 +39,26 @@ impl Spread {
     /// What is there and no finding.
     pub(crate) fn nuisances(&self) -> Vec<String> {
         let nuisances = self.terms.iter().filter(|own| own.judged.verdict.is_none());
-        nuisances.map(|own| crate::diagnosis::run::nuisance(&own.judged)).collect()
+        nuisances.map(|own| crate::diagnosis::run::nuisance(&own.judged.estimated[0].term)).collect()
     }
 }
 
 impl SpreadTerm {
     pub(crate) fn finding(&self) -> Finding {
-        let info = self.judged.estimated.term.effect.info();
+        let info = self.judged.estimated[0].term.effect.info();
         let verdict = self.judged.verdict.unwrap_or(Verdict::CannotTell);
+        let robots: Vec<u32> = self.robots.iter().map(|robot| robot.0).collect();
         Finding {
             verdict,
-            robots: self.robots.iter().map(|robot| robot.0).collect(),
+            configuration: sections(&robots, &self.judged.estimated),
+            robots,
             stage: info.stage.name().to_owned(),
             channel: self.judged.channel.name().to_owned(),
             effect: Some(info.name.to_owned()),
             expression: None,
             expression_units: None,
             support_set: self.support.iter().map(|effect| effect.name().to_owned()).collect(),
-            parameters: self.judged.estimated.parameters(),
+            parameters: self.judged.estimated[0].parameters(),
             place: self.judged.place.clone(),
             p_familywise: self.judged.p_familywise,
             // A wider or a heavier spread moves no prediction.
@@ -66,9 +68,8 @@ impl SpreadTerm {
                 rollout_rmse: Vec::new(),
             },
             manoeuvre: (self.support.len() > 1).then(|| info.broken_by.to_owned()),
-            summary: info.summary.to_owned(),
+            summary: String::new(),
             equation: Some(info.equation.to_owned()),
-            configuration: section(&self.judged.estimated),
         }
     }
 }

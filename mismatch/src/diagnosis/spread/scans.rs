@@ -3,11 +3,11 @@
 use pleiad_estimation::LandmarkId;
 use pleiad_estimation::sample::Target;
 use pleiad_physics::chain::sensors::Seen;
-use pleiad_physics::predict::{self, Instant};
-use pleiad_physics::{RobotModel, Scalar};
+use pleiad_physics::{RobotModel, Scalar, signal};
 
 use crate::channel::Channel;
 use crate::diagnosis::unit::Unit;
+use crate::sensors::At;
 use crate::sightings::{self, Sighted, seen};
 
 /// Landmarks, robots: the channels of their ranges and bearings.
@@ -26,12 +26,28 @@ pub(super) struct Reading<'s> {
 
 impl Reading<'_> {
     /// Range and bearing minus those predicted for a target, and the range predicted.
-    pub(super) fn errors(&self, model: &RobotModel<f64>, seen: &Seen) -> ([Option<f64>; 2], f64) {
-        let predicted = predict::sighting(model, &self.sighted.at.instant, seen);
+    pub(super) fn errors(
+        &self,
+        unit: &Unit<'_>,
+        model: &RobotModel<f64>,
+        seen: &Seen,
+    ) -> ([Option<f64>; 2], f64) {
+        let predicted = predicted(unit, model, &self.sighted.at, seen);
         let range = self.measured[0].map(|range_m| range_m - predicted.range_m);
         let bearing = self.measured[1].map(|bearing_rad| (bearing_rad - predicted.bearing_rad).wrapped());
         ([range, bearing], predicted.range_m)
     }
+}
+
+/// Range and bearing of a target.
+pub(super) fn predicted(
+    unit: &Unit<'_>,
+    model: &RobotModel<f64>,
+    at: &At,
+    seen: &Seen,
+) -> signal::Sighting<f64> {
+    let track = &unit.evidence.tracks[&unit.robot];
+    sightings::predicted(unit.evidence, (track, at), seen, model)
 }
 
 /// Sightings of one kind of target at one instant.
@@ -46,7 +62,7 @@ pub(super) fn scans<'s>(unit: &'s Unit<'_>, kind: usize) -> Vec<Scan<'s>> {
     let [ranges, bearings] = [0, 1].map(|part| plans.sightings[2 * kind + part].items.as_slice());
     let mut found: Vec<Scan<'s>> = Vec::new();
     let mut push = |sighted: &'s Sighted, measured| {
-        let time_s = sighted.at.instant.time_s;
+        let time_s = sighted.at.time_s;
         let reading = Reading { sighted, measured };
         match found.last_mut() {
             Some(scan) if scan.time_s >= time_s => scan.readings.push(reading),
@@ -56,7 +72,7 @@ pub(super) fn scans<'s>(unit: &'s Unit<'_>, kind: usize) -> Vec<Scan<'s>> {
     // Both are in the order of the record; a sighting with both parts is in both.
     let mut rest = bearings;
     for range in ranges {
-        let earlier = rest.partition_point(|own| own.at.instant.time_s < range.at.instant.time_s);
+        let earlier = rest.partition_point(|own| own.at.time_s < range.at.time_s);
         for bearing in &rest[..earlier] {
             push(bearing, [None, Some(bearing.measured)]);
         }
@@ -77,7 +93,7 @@ pub(super) fn scans<'s>(unit: &'s Unit<'_>, kind: usize) -> Vec<Scan<'s>> {
 
 #[allow(clippy::float_cmp, reason = "the same stamp")]
 fn is_same(range: &Sighted, bearing: &Sighted) -> bool {
-    range.target == bearing.target && range.at.instant.time_s == bearing.at.instant.time_s
+    range.target == bearing.target && range.at.time_s == bearing.at.time_s
 }
 
 /// Everything of a kind whose place at an instant is known.
@@ -99,13 +115,13 @@ pub(super) fn targets(unit: &Unit<'_>, kind: usize, time_s: f64) -> Vec<(Target,
 pub(super) fn in_view(
     unit: &Unit<'_>,
     model: &RobotModel<f64>,
-    instant: &Instant,
+    at: &At,
     seen: &Seen,
     margins: [f64; 2],
 ) -> bool {
     let Some(nominal) = &unit.evidence.recording.nominal else { return true };
     let sensor = &nominal.range_sensor;
-    let predicted = predict::sighting(model, instant, seen);
+    let predicted = predicted(unit, model, at, seen);
     let half_fov_rad = sensor.half_fov_rad;
     predicted.range_m > sensor.min_range_m + margins[0]
         && predicted.range_m < sensor.max_range_m - margins[0]
@@ -126,7 +142,7 @@ pub(super) fn repeats(units: &[&Unit<'_>]) -> bool {
 pub(super) fn actual(model: &RobotModel<f64>, reading: &Reading<'_>) -> Target {
     let named = reading.sighted.target;
     if sightings::renames(model) {
-        sightings::actual(model, &reading.sighted.at.instant, named)
+        sightings::actual(model, &reading.sighted.at.bare(), named)
     } else {
         named
     }

@@ -249,15 +249,15 @@ fn collect(
             for own in &scan.readings {
                 let named = actual(model, own);
                 let Some((_, seen)) = targets.iter().find(|(target, _)| *target == named) else { continue };
-                let (errors, range_m) = own.errors(model, seen);
+                let (errors, range_m) = own.errors(unit, model, seen);
                 if !errors.iter().flatten().all(|error| error.is_finite()) {
                     continue;
                 }
                 let others = targets.iter().filter(|(target, _)| *target != named);
-                let instant = &own.sighted.at.instant;
+                let at = &own.sighted.at;
                 let choices = if repeats {
                     scan.readings.len() - 1
-                } else if others.clone().any(|(_, seen)| in_view(unit, model, instant, seen, [0.0; 2])) {
+                } else if others.clone().any(|(_, seen)| in_view(unit, model, at, seen, [0.0; 2])) {
                     scan.readings.len()
                 } else {
                     0
@@ -265,9 +265,9 @@ fn collect(
                 rows.push(Row {
                     kind,
                     range_m,
-                    yaw_rate_rad_s: own.sighted.at.instant.motion.yaw_rate_rad_s,
+                    yaw_rate_rad_s: own.sighted.at.motion.yaw_rate_rad_s,
                     errors,
-                    others: others.map(|(_, seen)| own.errors(model, seen).0).collect(),
+                    others: others.map(|(_, seen)| own.errors(unit, model, seen).0).collect(),
                     choices,
                 });
                 let channel = channels[usize::from(own.measured[0].is_none())];

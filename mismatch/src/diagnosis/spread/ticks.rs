@@ -80,8 +80,15 @@ pub(super) fn coarse(units: &[&Unit<'_>], robot: RobotId, tests: usize) -> Optio
         Channel::Body
     };
     let verdict = named.then_some(Verdict::Named);
-    let judged =
-        Judged { estimated, verdict, p_familywise, channel, place: Place::default(), one_off: false };
+    let judged = Judged {
+        estimated: vec![estimated],
+        total: None,
+        verdict,
+        p_familywise,
+        channel,
+        place: Place::default(),
+        one_off: false,
+    };
     Some(SpreadTerm { judged, gain, robots: vec![robot], support: vec![Effect::EncoderCoarse] })
 }
 

@@ -170,7 +170,7 @@ fn tested(findings: &Findings, robots: &BTreeSet<RobotId>) -> Vec<StageTest> {
 fn residual(series: &pleiad_mismatch::ResidualSeries) -> ResidualColumns {
     let (component, unit) = component(series.channel, series.component);
     ResidualColumns {
-        recording: String::new(),
+        recording: series.recording.clone(),
         robot: RobotId(series.robot),
         channel: words(series.channel).to_owned(),
         component,
@@ -187,7 +187,7 @@ fn evidence(own: &pleiad_mismatch::PartialResidual) -> Evidence {
     let (component, unit) = component(own.channel, own.component);
     Evidence {
         finding: own.finding,
-        recording: String::new(),
+        recording: own.recording.clone(),
         robot: RobotId(own.robot),
         channel: words(own.channel).to_owned(),
         component,

@@ -1,0 +1,172 @@
+//! Fits effects that are known to act: the structure is given, the parameters are searched.
+//!
+//! This is what a diagnosis could reach at best, and how its standard errors are held against the truth
+//! (`docs/benchmarks/effects.md`). The search is the diagnosis's own: its starts, its scores, its refinement
+//! of places and onsets, its fit.
+
+use pleiad_estimation::RobotId;
+use pleiad_physics::{Effect, Fit as How};
+use pleiad_recording::Recording;
+
+use crate::builtin;
+use crate::diagnosis::candidate::candidates;
+use crate::diagnosis::entries::is_shared;
+use crate::diagnosis::fit::{Effort, Fit, fit};
+use crate::diagnosis::naming::Estimated;
+use crate::diagnosis::profile::{Profile, polish};
+use crate::diagnosis::refine::refine;
+use crate::diagnosis::run::{Prepared, unit};
+use crate::diagnosis::select::{Scored, covariance, fit_beside, score, whites};
+use crate::diagnosis::term::{Term, Whose};
+use crate::diagnosis::unit::Unit;
+use crate::error::MismatchError;
+use crate::evidence::Evidence;
+
+/// So many of the strongest starts are fitted.
+const STARTS: usize = 6;
+
+/// What an interval of a known parameter is from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interval {
+    /// The derivative of the predictions and the robust covariance of the scores.
+    Sandwich,
+    /// The values at which the likelihood, with everything else fitted again, is not yet too low: of
+    /// thresholds, onsets and borders.
+    Profile,
+    /// There is none: a label, or nothing in the recording shows the parameter.
+    None,
+}
+
+/// A parameter of an effect that is known to act.
+#[derive(Clone, Debug)]
+pub struct KnownParameter {
+    /// The name with its component.
+    pub label: String,
+    /// The unit; `1` for a pure number.
+    pub unit: &'static str,
+    /// The value fitted.
+    pub value: f64,
+    /// Standard error: of a profile, half of the interval over 1.96.
+    pub standard_error: Option<f64>,
+    /// The 95 % interval.
+    pub ci95: Option<[f64; 2]>,
+    /// What the interval is from.
+    pub interval: Interval,
+}
+
+/// An effect that is known to act, fitted.
+#[derive(Clone, Debug)]
+pub struct KnownFit {
+    /// Which effect.
+    pub effect: Effect,
+    /// The robots on whose residuals it was fitted.
+    pub robots: Vec<RobotId>,
+    /// In the order of the effect's parameters.
+    pub parameters: Vec<KnownParameter>,
+}
+
+impl KnownFit {
+    /// The parameter of this label.
+    pub fn parameter(&self, label: &str) -> Option<&KnownParameter> {
+        self.parameters.iter().find(|parameter| parameter.label == label)
+    }
+}
+
+/// Whether an effect acts on every robot alike: of the world, of a place, of the map, of the reference system.
+pub fn acts_on_every_robot(effect: Effect) -> bool {
+    is_shared(effect.info())
+}
+
+/// Fits effects that are known to act on a robot, one after the other and then together. One that every
+/// robot shares, such as a slope of the floor, is fitted to the residuals of all of them.
+///
+/// An effect that shows nowhere in the recording is left out.
+///
+/// # Errors
+/// The recording has no nominal model and its odometry is not of commands, or the model lacks a robot.
+pub fn fit_known(
+    recording: &Recording,
+    robot: RobotId,
+    effects: &[Effect],
+) -> Result<Vec<KnownFit>, MismatchError> {
+    let models = builtin::models(recording)?;
+    let evidence = Evidence::new(recording, &models);
+    let prepared = Prepared { recording, evidence, models, tested: false };
+    let shared = effects.iter().any(|effect| is_shared(effect.info()));
+    let concerned = prepared.models.iter().filter(|(own, _)| shared || **own == robot);
+    let all: Vec<Unit<'_>> = concerned.map(|(&own, model)| unit(0, &prepared, own, model)).collect();
+    let units: Vec<&Unit<'_>> = all.iter().filter(|unit| !unit.rows.is_empty()).collect();
+
+    let Some(mut current) = fit(&units, Vec::new(), &|_| true, Effort::FULL) else { return Ok(Vec::new()) };
+    for &effect in effects {
+        let whose = if is_shared(effect.info()) { Whose::Everyone } else { Whose::Robot(robot) };
+        if let Some(term) = found(&units, &current, effect, whose) {
+            let mut terms = current.terms.clone();
+            terms.push(term);
+            current = fit(&units, terms, &|_| true, Effort::FULL).unwrap_or(current);
+        }
+    }
+    let current = polish(&units, current);
+    Ok(known(&units, &current))
+}
+
+/// An effect where the likelihood is greatest beside a fit, of all its starts.
+fn found(units: &[&Unit<'_>], current: &Fit, effect: Effect, whose: Whose) -> Option<Term> {
+    let whites = whites(units, current);
+    let candidates = candidates(effect, whose, units, &current.terms, &current.states);
+    let mut scored: Vec<Scored> =
+        candidates.iter().filter_map(|candidate| score(units, &whites, candidate)).collect();
+    scored.sort_by(|a, b| b.step.gain.total_cmp(&a.step.gain));
+    scored.truncate(STARTS);
+    let mut best: Option<(f64, Term)> = None;
+    for start in &scored {
+        let start = refine(units, &whites, start);
+        let Some(fitted) = fit_beside(units, current, start.term()) else { continue };
+        if best.as_ref().is_none_or(|(most, _)| fitted.log_likelihood > *most) {
+            best = fitted.terms.last().map(|term| (fitted.log_likelihood, term.clone()));
+        }
+    }
+    best.map(|(_, term)| term)
+}
+
+/// Values and intervals of every term.
+fn known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
+    // Thresholds alone leave nothing that has a derivative.
+    let found = if fit.slots.is_empty() { None } else { covariance(units, fit) };
+    let covariance =
+        found.unwrap_or_else(|| nalgebra::DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
+    let profile = Profile::new(units, fit);
+    let one = |position: usize| {
+        let estimated = Estimated::of(fit, &covariance, position);
+        let term = &estimated.term;
+        let parameter = |index: usize| {
+            let parameter = &term.parameters()[index];
+            let mut own = KnownParameter {
+                label: parameter.label(),
+                unit: parameter.unit,
+                value: term.values[index],
+                standard_error: None,
+                ci95: None,
+                interval: Interval::None,
+            };
+            if let Some(error) = estimated.errors[index] {
+                own.standard_error = Some(error);
+                own.ci95 = estimated.interval(index);
+                own.interval = Interval::Sandwich;
+            } else if parameter.fit != How::Choice
+                && let Some(ci95) = profile.interval((position, index))
+            {
+                own.standard_error = Some((ci95[1] - ci95[0]) / (2.0 * crate::diagnosis::naming::Z_95));
+                own.ci95 = Some(ci95);
+                own.interval = Interval::Profile;
+            }
+            own
+        };
+        KnownFit {
+            effect: term.effect,
+            robots: units.iter().map(|unit| unit.robot).filter(|&robot| term.acts_on(robot)).collect(),
+            parameters: (0..term.values.len()).map(parameter).collect(),
+        }
+    };
+    (0..fit.terms.len()).map(one).collect()
+}
