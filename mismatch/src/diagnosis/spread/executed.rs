@@ -336,3 +336,52 @@ pub(super) fn explained(family: &Family<'_, '_>, shows: &Shows, by: Effect, fit:
     };
     fit.terms.iter().enumerate().filter(|(_, term)| own(term)).map(judged).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use pleiad_physics::chain::actuator::{ActuatorState, schedule};
+    use pleiad_physics::predict::{CommandWindow, wheel_turns};
+    use pleiad_physics::{Chance, Drive, Nominal, Surroundings};
+
+    use super::*;
+
+    /// The turn of both wheels' mean from `from_s` to `to_s` when a set-point comes at this time.
+    fn driven(comes_s: f64, from_s: f64, to_s: f64) -> f64 {
+        let mut nominal = Nominal::ideal(0.05, 0.3);
+        nominal.servo_time_constant_s = 0.08;
+        let model = RobotModel::nominal(Drive::Differential, nominal);
+        let command = |time_s, speed_m_s| Command { time_s, speed_m_s, yaw_rate_rad_s: 0.0 };
+        let commands = [command(0.0, 0.2), command(comes_s, 0.5)];
+        let scheduled = schedule(&model, &commands, |_| Chance::EXPECTED);
+        let mut state = ActuatorState::default();
+        let mut turn = |from_s, to_s| {
+            let motion = Motion::at_rest(Pose::identity());
+            let window = CommandWindow { from_s, to_s, motion, surroundings: Surroundings::default() };
+            let [left, right] = wheel_turns(&model, &scheduled, &window, &mut state);
+            f64::midpoint(left, right)
+        };
+        turn(0.0, from_s);
+        turn(from_s, to_s)
+    }
+
+    #[test]
+    fn a_late_command_turns_the_wheel_by_the_closed_form_less() {
+        let by_rad_s = (0.5 - 0.2) / 0.05;
+        let window = (1.0, 1.2);
+        for (comes_s, late_s) in [(0.9, 0.04), (1.05, 0.04), (1.18, 0.04), (0.97, 0.1)] {
+            let simulated =
+                driven(comes_s + late_s, window.0, window.1) - driven(comes_s, window.0, window.1);
+            let change = |late_s: f64| {
+                let at = |end_s: f64| turned(end_s - comes_s - late_s, 0.08);
+                by_rad_s * (at(window.1) - at(window.0))
+            };
+            let closed = change(late_s) - change(0.0);
+            assert!((simulated - closed).abs() < 1e-12, "{comes_s} {late_s}: {simulated} {closed}");
+            assert!(closed < -1e-3, "it shows");
+            // The slope with the delay is minus what the servo reaches in the window.
+            let slope = -by_rad_s * (reached(1.2 - comes_s, 0.08) - reached(1.0 - comes_s, 0.08));
+            let step = 1e-6;
+            assert!((slope - (change(step) - change(-step)) / (2.0 * step)).abs() < 1e-4);
+        }
+    }
+}

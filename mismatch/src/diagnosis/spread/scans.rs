@@ -10,6 +10,9 @@ use crate::diagnosis::unit::Unit;
 use crate::sensors::At;
 use crate::sightings::{self, Sighted, seen};
 
+/// The median size of a normal error times this is its standard deviation.
+const NORMAL_OVER_MEDIAN: f64 = 1.482_602_218_505_602;
+
 /// Landmarks, robots: the channels of their ranges and bearings.
 pub(super) const CHANNELS: [[Channel; 2]; 2] = [
     [Channel::RangeToLandmark, Channel::BearingToLandmark],
@@ -108,6 +111,14 @@ pub(super) fn targets(unit: &Unit<'_>, kind: usize, time_s: f64) -> Vec<(Target,
     others
         .filter_map(|&robot| Some((Target::Robot(robot), seen(evidence, Target::Robot(robot), time_s).ok()?)))
         .collect()
+}
+
+/// The spread of errors by the median of their sizes, which are reordered; `None` without errors, or where most
+/// are zero.
+pub(super) fn median_spread(sizes: &mut [f64]) -> Option<f64> {
+    sizes.sort_by(f64::total_cmp);
+    let middle = *sizes.get(sizes.len() / 2)?;
+    (middle > 0.0).then_some(NORMAL_OVER_MEDIAN * middle)
 }
 
 /// Whether the declared sensor has a target in view at an instant, by this margin of range and bearing; yes if

@@ -18,7 +18,7 @@ use crate::diagnosis::fit::Fit;
 use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
-use crate::diagnosis::spread::scans::{CHANNELS, actual, in_view, repeats, scans, targets};
+use crate::diagnosis::spread::scans::{CHANNELS, actual, in_view, median_spread, repeats, scans, targets};
 use crate::diagnosis::unit::Unit;
 
 /// Parameters: the logarithms of the least sigma, of range and bearing, to landmarks and to robots.
@@ -113,9 +113,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
     let spread = |kind: usize, part: usize| -> Option<f64> {
         let own = rows.iter().filter(|row| row.kind == kind);
         let mut sizes: Vec<f64> = own.filter_map(|row: &Row| row.errors[part].map(f64::abs)).collect();
-        sizes.sort_by(f64::total_cmp);
-        let middle = *sizes.get(sizes.len() / 2)?;
-        (middle > 0.0).then_some(1.4826 * middle)
+        median_spread(&mut sizes)
     };
     let spreads = [spread(0, 0), spread(0, 1), spread(1, 0), spread(1, 1)];
     for row in &mut rows {
