@@ -111,28 +111,38 @@ pub(crate) fn residuals<S: Scalar>(
         let at = &own.at;
         let plain = at.instant(track);
         let other = renamed.then(|| actual(model, &plain, own.target)).filter(|other| *other != own.target);
-        let target = other.unwrap_or(own.target);
         let other = other.and_then(|other| seen(evidence, other, at.time_s).ok());
-        let path = match target {
-            Target::Robot(robot) => {
-                evidence.tracks.get(&robot).and_then(|track| track.path_in_map(at.time_s))
-            }
-            Target::Landmark(_) => None,
-        };
-        let instant = &Instant { target: path.as_ref().map(|path| path as &dyn Path), ..plain };
-        let predicted = predict::sighting(model, instant, other.as_ref().unwrap_or(&own.seen));
+        let predicted = predicted(evidence, (track, at), other.as_ref().unwrap_or(&own.seen), model);
         let context = Context {
-            surroundings: instant.surroundings,
-            ..Context::new(&model.nominal, instant.time_s, instant.motion.lift())
+            surroundings: plain.surroundings,
+            ..Context::new(&model.nominal, plain.time_s, plain.motion.lift())
         };
         let noise = chain::noise(model, &context, predicted.range_m, predicted.bearing_rad);
         let (value, sigma) = match part {
             Part::Range => (-predicted.range_m + own.measured, noise.range_sigma_m),
             Part::Bearing => ((-predicted.bearing_rad + own.measured).wrapped(), noise.bearing_sigma_rad),
         };
-        channel.push(Residual::new(instant.time_s, own.at.regime, Some(own.target), &[value], &[sigma]));
+        channel.push(Residual::new(at.time_s, at.regime, Some(own.target), &[value], &[sigma]));
     }
     channel
+}
+
+/// What a robot reads of a target: the reference pose is carried along its path, and a robot's along its own.
+pub(crate) fn predicted<S: Scalar>(
+    evidence: &Evidence<'_>,
+    (track, at): (&Track, &At),
+    seen: &Seen,
+    model: &RobotModel<S>,
+) -> signal::Sighting<S> {
+    let path = match seen.target {
+        signal::Target::Robot(robot) => {
+            let track = evidence.tracks.get(&RobotId(robot));
+            track.and_then(|track| track.path_in_map(at.time_s))
+        }
+        signal::Target::Landmark(_) => None,
+    };
+    let instant = Instant { target: path.as_ref().map(|path| path as &dyn Path), ..at.instant(track) };
+    predict::sighting(model, &instant, seen)
 }
 
 /// Whether a model gives wrong names to what is seen, always and not by chance.

@@ -89,7 +89,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     entries.untestable.extend(hidden(&units, &entries.entries, &fit, &pool));
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
-    let spread = spread::spread(&units, &fit, &spread_entries, &swaps, count);
+    let spread = spread::spread(&units, &tests, &fit, &spread_entries, &swaps, count);
     spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 

@@ -4,26 +4,30 @@
 //! by `F(d)` more than predicted: for a first-order servo a closed form. Over the commands `k` of a window
 //!
 //! ```text
-//! residual = m F'(0) + sum of F_k(d_k) + white noise
+//! residual = m F'(0) + sum of F_k(d_k) + white noise of Student's t
 //! jitter: d_k ~ U(0, D), so F' has the variance (J^2 + D^2)/12 F'_k(0)^2, J the declared jitter
 //! loss: with probability p, d_k is the time to the next command; at most two of a window
 //! ```
 //!
-//! `m` is a delay left over by the fit of the mean. Windows that share a command are taken as independent
+//! `m` is a delay left over by the fit of the mean, and the tails of the noise are estimated: a window that the
+//! model of the servo does not fit is not an execution gone wrong. `du` is what the set-point hooks of the
+//! fitted effects make of a command. Windows that share a command are taken as independent
 //! given it; variances are summed over blocks.
 
 use pleiad_physics::chain::actuator::Command;
-use pleiad_physics::{Effect, RobotModel};
+use pleiad_physics::signal::{SetPoint, WheelSetPoint};
+use pleiad_physics::{Context, Effect, Motion, Pose, RobotModel};
 
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::naming::NEAR_END;
 use crate::diagnosis::spread::Explained;
-use crate::diagnosis::spread::density::{bounded, log_sum};
+use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Family, Member, Place, Shown, Shows, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::Unit;
+use crate::track::{Track, motion};
 
 /// Logarithms of the white noise of both components.
 const NOISE: usize = 0;
@@ -33,12 +37,16 @@ const DELAY: usize = 2;
 const JITTER: usize = 3;
 /// The logarithm of the probability of a loss.
 const LOSS: usize = 4;
+/// The reciprocal of the degrees of freedom of the noise: windows that nothing here explains.
+const TAILS: usize = 5;
 /// Of this many commands of a window it is asked whether they were lost.
 const ASKED: usize = 8;
 /// After this many time constants a command's delay no longer shows.
 const MEMORY: f64 = 6.0;
 /// A step between commands beyond this is a gap and no loss, seconds.
 const GAP_S: f64 = 0.5;
+/// A change of the set-point that an effect alters by more than this share is bent.
+const BENT: f64 = 0.3;
 /// A lost command must change a window by this share of its noise.
 const LEAST_CHANGE: f64 = 0.3;
 /// The logarithm of a probability that is as good as zero.
@@ -72,6 +80,7 @@ impl Density for Windows {
 
     fn fill(&self, parameters: &[f64], into: &mut [f64]) {
         let white = [0, 1].map(|component| libm::exp(2.0 * parameters[NOISE + component]));
+        let student = Student::new(parameters[TAILS]);
         let lost = parameters[LOSS];
         let kept = libm::log1p(-libm::exp(lost));
         for (row, value) in self.rows.iter().zip(into) {
@@ -80,7 +89,7 @@ impl Density for Windows {
             let of = |changes: [f64; 2]| -> f64 {
                 let part = |part: usize| {
                     let expected = parameters[DELAY] * row.delayed[part] + changes[part];
-                    bounded((row.residual[part] - expected) / sigma[part], sigma[part])
+                    student.log_density((row.residual[part] - expected) / sigma[part], sigma[part])
                 };
                 part(0) + part(1)
             };
@@ -138,6 +147,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
         Bounds { low: -0.2, high: 0.2, scale: 1e-3 },
         Bounds { low: 0.0, high: most_s * most_s, scale: 1e-4 },
         Bounds { low: NEVER, high: -0.7, scale: 0.3 },
+        Bounds { low: 0.0, high: 0.5, scale: 0.05 },
     ];
     let mut members = vec![Member {
         effect: Effect::CommandJitter,
@@ -148,7 +158,8 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
         contrasts: Vec::new(),
         chances: None,
     }];
-    let asked = rows.iter().filter(|row| !row.lost.is_empty()).count();
+    // A command shows in about two windows.
+    let asked = rows.iter().map(|row| row.lost.len()).sum::<usize>().div_ceil(2);
     if asked > 0 {
         members.push(Member {
             effect: Effect::CommandLoss,
@@ -165,8 +176,8 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
         units: units.to_vec(),
         places,
         bounds,
-        start: vec![spreads[0].ln(), spreads[1].ln(), 0.0, 0.0, f64::NEG_INFINITY],
-        nuisances: vec![NOISE, NOISE + 1, DELAY],
+        start: vec![spreads[0].ln(), spreads[1].ln(), 0.0, 0.0, f64::NEG_INFINITY, 0.05],
+        nuisances: vec![NOISE, NOISE + 1, DELAY, TAILS],
         members,
     })
 }
@@ -177,6 +188,8 @@ struct Change {
     /// Of the wheels' mean, and of right minus left, rad/s.
     by: [f64; 2],
     late_s: Option<f64>,
+    /// A limit or a dead band changes it: when exactly a set-point leaves that, no fit knows well enough.
+    bent: bool,
 }
 
 fn collect(
@@ -193,7 +206,7 @@ fn collect(
         return;
     }
     let (constants_s, latency_s) = servo(model);
-    let changes = changes(unit, &track.commands, track.geometry_m, latency_s);
+    let changes = changes(unit, track, model, latency_s);
     let memory_s = MEMORY * constants_s[0].max(constants_s[1]) + GAP_S;
     let declared = unit.evidence.recording.nominal.as_ref();
     let declared_jitter_s = declared.map_or(0.0, |nominal| nominal.noise.command_jitter_s);
@@ -208,15 +221,18 @@ fn collect(
             lost: Vec::new(),
             declared_jitter_s,
         };
+        if changes[first..past].iter().any(|change| change.bent) {
+            continue;
+        }
         for change in &changes[first..past] {
             let (begun_s, ended_s) = (from_s - change.acts_s, to_s - change.acts_s);
             let delayed = [0, 1].map(|part: usize| {
                 let reached = |since_s| reached(since_s, constants_s[part]);
                 -change.by[part] * (reached(ended_s) - reached(begun_s))
             });
-            for ((sum, agitation), delayed) in row.delayed.iter_mut().zip(&mut row.agitation).zip(delayed) {
-                *sum += delayed;
-                *agitation += delayed * delayed;
+            for (part, change) in delayed.into_iter().enumerate() {
+                row.delayed[part] += change;
+                row.agitation[part] += change * change;
             }
             if let Some(late_s) = change.late_s {
                 row.lost.push([0, 1].map(|part: usize| {
@@ -247,27 +263,46 @@ fn servo(model: &RobotModel<f64>) -> ([f64; 2], f64) {
     (constants_s.map(|constant_s| (constant_s + lag_s).max(1e-4)), delay_s)
 }
 
-fn changes(
-    unit: &Unit<'_>,
-    commands: &[Command],
-    [radius_m, axle_m]: [f64; 2],
-    latency_s: f64,
-) -> Vec<Change> {
+fn changes(unit: &Unit<'_>, track: &Track, model: &RobotModel<f64>, latency_s: f64) -> Vec<Change> {
     let recorded = unit.evidence.robot(unit.robot).map_or(&[][..], |(recording, _)| &recording.commands);
     let stamps: Vec<f64> = recorded.iter().map(|command| unit.evidence.seconds(command.time)).collect();
-    let change = |pair: &[Command]| {
-        let time_s = pair[1].time_s;
+    let targets = |model: &RobotModel<f64>| -> Vec<[f64; 2]> {
+        track.commands.iter().map(|command| target(track, model, command, latency_s)).collect()
+    };
+    let (targets, plain) = (targets(model), targets(&unit.nominal));
+    let change = |index: usize| {
+        let time_s = track.commands[index].time_s;
         let next = stamps.partition_point(|stamp_s| *stamp_s <= time_s);
+        let by =
+            |targets: &[[f64; 2]]| [0, 1].map(|part: usize| targets[index][part] - targets[index - 1][part]);
+        let (by, plain) = (by(&targets), by(&plain));
+        let size = |by: [f64; 2]| by[0].hypot(0.5 * by[1]);
         Change {
             acts_s: time_s + latency_s,
-            by: [
-                (pair[1].speed_m_s - pair[0].speed_m_s) / radius_m,
-                (pair[1].yaw_rate_rad_s - pair[0].yaw_rate_rad_s) * axle_m / radius_m,
-            ],
+            bent: size([by[0] - plain[0], by[1] - plain[1]]) > BENT * size(plain),
+            by,
             late_s: stamps.get(next).map(|next_s| next_s - time_s).filter(|late_s| *late_s < GAP_S),
         }
     };
-    commands.windows(2).map(change).collect()
+    (1..track.commands.len()).map(change).collect()
+}
+
+/// What a command asks of the wheels under a model: their mean, and right minus left, rad/s.
+fn target(track: &Track, model: &RobotModel<f64>, command: &Command, latency_s: f64) -> [f64; 2] {
+    let time_s = command.time_s + latency_s;
+    let mut context = Context::new(&model.nominal, time_s, Motion::at_rest(Pose::identity()));
+    if let Some(regime) = track.regime_at(time_s) {
+        context.motion = motion(&regime, regime.pose.unwrap_or(Pose::identity()));
+    }
+    let mut asked = SetPoint { speed_m_s: command.speed_m_s, yaw_rate_rad_s: command.yaw_rate_rad_s };
+    model.apply(&context, |effect, values| effect.set_point(values, &context, &mut asked));
+    let [radius_m, axle_m] = track.geometry_m;
+    let turn_m_s = 0.5 * axle_m * asked.yaw_rate_rad_s;
+    let speed_rad_s = [asked.speed_m_s - turn_m_s, asked.speed_m_s + turn_m_s].map(|rim| rim / radius_m);
+    let mut wheels = WheelSetPoint { speed_rad_s };
+    model.apply(&context, |effect, values| effect.wheel_set_point(values, &context, &mut wheels));
+    let [left, right] = wheels.speed_rad_s;
+    [f64::midpoint(left, right), right - left]
 }
 
 /// What share of a step a servo has reached after a time.
@@ -300,4 +335,53 @@ pub(super) fn explained(family: &Family<'_, '_>, shows: &Shows, by: Effect, fit:
         Explained { position, by, part: remains.then_some(term.values[0] - left_s) }
     };
     fit.terms.iter().enumerate().filter(|(_, term)| own(term)).map(judged).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use pleiad_physics::chain::actuator::{ActuatorState, schedule};
+    use pleiad_physics::predict::{CommandWindow, wheel_turns};
+    use pleiad_physics::{Chance, Drive, Nominal, Surroundings};
+
+    use super::*;
+
+    /// The turn of both wheels' mean from `from_s` to `to_s` when a set-point comes at this time.
+    fn driven(comes_s: f64, from_s: f64, to_s: f64) -> f64 {
+        let mut nominal = Nominal::ideal(0.05, 0.3);
+        nominal.servo_time_constant_s = 0.08;
+        let model = RobotModel::nominal(Drive::Differential, nominal);
+        let command = |time_s, speed_m_s| Command { time_s, speed_m_s, yaw_rate_rad_s: 0.0 };
+        let commands = [command(0.0, 0.2), command(comes_s, 0.5)];
+        let scheduled = schedule(&model, &commands, |_| Chance::EXPECTED);
+        let mut state = ActuatorState::default();
+        let mut turn = |from_s, to_s| {
+            let motion = Motion::at_rest(Pose::identity());
+            let window = CommandWindow { from_s, to_s, motion, surroundings: Surroundings::default() };
+            let [left, right] = wheel_turns(&model, &scheduled, &window, &mut state);
+            f64::midpoint(left, right)
+        };
+        turn(0.0, from_s);
+        turn(from_s, to_s)
+    }
+
+    #[test]
+    fn a_late_command_turns_the_wheel_by_the_closed_form_less() {
+        let by_rad_s = (0.5 - 0.2) / 0.05;
+        let window = (1.0, 1.2);
+        for (comes_s, late_s) in [(0.9, 0.04), (1.05, 0.04), (1.18, 0.04), (0.97, 0.1)] {
+            let simulated =
+                driven(comes_s + late_s, window.0, window.1) - driven(comes_s, window.0, window.1);
+            let change = |late_s: f64| {
+                let at = |end_s: f64| turned(end_s - comes_s - late_s, 0.08);
+                by_rad_s * (at(window.1) - at(window.0))
+            };
+            let closed = change(late_s) - change(0.0);
+            assert!((simulated - closed).abs() < 1e-12, "{comes_s} {late_s}: {simulated} {closed}");
+            assert!(closed < -1e-3, "it shows");
+            // The slope with the delay is minus what the servo reaches in the window.
+            let slope = -by_rad_s * (reached(1.2 - comes_s, 0.08) - reached(1.0 - comes_s, 0.08));
+            let step = 1e-6;
+            assert!((slope - (change(step) - change(-step)) / (2.0 * step)).abs() < 1e-4);
+        }
+    }
 }

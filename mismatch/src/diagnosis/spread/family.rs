@@ -138,6 +138,8 @@ pub(super) struct Shows {
     /// Its position among the members.
     pub(super) member: usize,
     pub(super) with: Optimum,
+    /// Without it, fitted again.
+    pub(super) without: Optimum,
     pub(super) known: Uncertainty,
     /// Probability of as strong a sign without it, at this test alone.
     pub(super) p: f64,
@@ -145,6 +147,11 @@ pub(super) struct Shows {
     pub(super) channel: Channel,
     /// Other effects that explain it about equally.
     pub(super) rivals: Vec<Effect>,
+}
+
+#[allow(clippy::float_cmp, reason = "the off value itself")]
+fn is_same(value: f64, off: f64) -> bool {
+    value == off
 }
 
 /// The gain of a row, no more than what a residual of [`noise::CLIP`] sigmas costs: no instant outweighs the rest.
@@ -167,7 +174,7 @@ impl Family<'_, '_> {
             for ((&parameter, &off), &begin) in member.parameters.iter().zip(&member.off).zip(&member.start) {
                 if !active.contains(&index) {
                     start[parameter] = off;
-                } else if start[parameter] == off {
+                } else if is_same(start[parameter], off) {
                     start[parameter] = begin;
                 }
             }
@@ -226,14 +233,14 @@ impl Family<'_, '_> {
         let inflation = known.inflation(&own.parameters);
         let ratio = 2.0 * (with.log_likelihood - without.log_likelihood) / inflation;
         let p = upper_tail(ratio, own.parameters.len());
-        if own.chances.is_some() {
+        // The estimate of a probability or a variance is far from normal where it is small: its error says less
+        // than the ratio.
+        if own.chances.is_some() || own.shown.iter().any(|shown| matches!(shown, Shown::Root(_))) {
             return (p, inflation);
         }
         let departure: Vec<f64> =
             own.parameters.iter().zip(&own.off).map(|(&index, off)| with.parameters[index] - off).collect();
-        // The error of a variance grows with it: its root is nearer to a normal distribution.
-        let sharper = if own.shown.iter().any(|shown| matches!(shown, Shown::Root(_))) { 4.0 } else { 1.0 };
-        match known.wald(&own.parameters, &departure).map(|wald| sharper * wald) {
+        match known.wald(&own.parameters, &departure) {
             Some(wald) => (p.max(upper_tail(wald, own.parameters.len())), inflation),
             None => (1.0, inflation),
         }
@@ -260,23 +267,26 @@ impl Family<'_, '_> {
         let known = self.known(active, with)?;
         let gain = self.gain((active, with), (&others, &without));
         let channel = self.channel(with, &without);
-        Some(Shows { member, with: with.clone(), known, p, gain, channel, rivals })
+        Some(Shows { member, with: with.clone(), without, known, p, gain, channel, rivals })
+    }
+
+    /// What one likelihood adds to another in the log-density of other recordings.
+    pub(super) fn gain_in(held: &Family<'_, '_>, with: &Optimum, without: &Optimum) -> Gain {
+        let (mut high, mut low) = (vec![0.0; held.places.len()], vec![0.0; held.places.len()]);
+        held.density.fill(&with.parameters, &mut high);
+        held.density.fill(&without.parameters, &mut low);
+        let mut sums = vec![0.0; held.density.blocks().iter().max().map_or(0, |last| last + 1)];
+        for (&block, (high, low)) in held.density.blocks().iter().zip(high.iter().zip(&low)) {
+            sums[block] += bounded_gain(high - low);
+        }
+        summed(&[sums])
     }
 
     /// What a member adds to the log-density of folds that neither likelihood saw.
     fn gain(&self, with: (&[usize], &Optimum), without: (&[usize], &Optimum)) -> Gain {
-        let mut sums: Vec<Vec<f64>> = self.units.iter().map(|unit| vec![0.0; unit.blocks + 1]).collect();
         let (mut high, mut low) = (vec![0.0; self.places.len()], vec![0.0; self.places.len()]);
-        let blocks = blocks(&self.units, &self.places);
-        let firsts: Vec<usize> = self
-            .units
-            .iter()
-            .scan(0, |count, unit| {
-                let first = *count;
-                *count += unit.blocks + 1;
-                Some(first)
-            })
-            .collect();
+        let blocks = self.density.blocks();
+        let mut sums = vec![0.0; blocks.iter().max().map_or(0, |last| last + 1)];
         for number in 0..FOLDS {
             let fold = |place: &Place| fold(self.units[place.unit], number);
             let kept = |row: usize| {
@@ -287,11 +297,11 @@ impl Family<'_, '_> {
             self.density.fill(&self.fit(without.0, without.1, &kept).parameters, &mut low);
             for (row, place) in self.places.iter().enumerate() {
                 if fold(place).contains(&place.time_s) {
-                    sums[place.unit][blocks[row] - firsts[place.unit]] += bounded_gain(high[row] - low[row]);
+                    sums[blocks[row]] += bounded_gain(high[row] - low[row]);
                 }
             }
         }
-        summed(&sums)
+        summed(&[sums])
     }
 
     /// The channel whose rows gain most, among those in which the effect shows.

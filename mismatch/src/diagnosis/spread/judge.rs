@@ -121,7 +121,8 @@ pub(super) fn undetected(
                 .iter()
                 .map(|unit| parameter.relevance.threshold(&unit.floors))
                 .fold(0.0, f64::max);
-            let error = |index: usize| Some(known.as_ref()?.between(index, index)?.sqrt());
+            // Each size for itself, the effect's other parameters off.
+            let error = |index: usize| known.as_ref()?.alone(&member.parameters, index);
             let near = NEAR_END + POWER_80;
             let size = match *shown {
                 Shown::Value(index) => {
@@ -136,11 +137,7 @@ pub(super) fn undetected(
                     let least = member.contrasts.first().map_or(0.0, |contrast| contrast.threshold);
                     1.0 / ((critical + POWER_80) * error).max(least + near * error)
                 }),
-                // A count of n p events is known to its root.
-                Shown::Exp(_) => member.chances.map(|count| {
-                    let one = near / (count as f64).sqrt();
-                    (0.5 * (one + (one * one + 4.0 * threshold).sqrt())).powi(2)
-                }),
+                Shown::Exp(_) => member.chances.map(|chances| least_probability(chances, threshold)),
                 Shown::ExpLess(..) | Shown::Fixed(_) => None,
             };
             let Some(minimum_detectable) = size.filter(|size| size.is_finite()) else { continue };
@@ -154,4 +151,21 @@ pub(super) fn undetected(
         }
     }
     all
+}
+
+/// The least probability of events of so many chances whose near end is beyond a threshold in four of five
+/// recordings: a count of `n p` events is known to its root.
+fn least_probability(chances: usize, threshold: f64) -> f64 {
+    let near = NEAR_END + POWER_80;
+    let (mut low, mut high) = (threshold, 1.0);
+    for _ in 0..60 {
+        let middle = f64::midpoint(low, high);
+        let beyond = middle * libm::exp(-near / (chances as f64 * middle).sqrt()) > threshold;
+        if beyond {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
 }

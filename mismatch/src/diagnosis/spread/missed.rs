@@ -10,20 +10,21 @@
 //! The instants are the stamps of sightings, and those between them where the sensor's period says that it
 //! looked and saw nothing.
 
-use pleiad_physics::predict;
 use pleiad_physics::{Effect, RobotModel};
 
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
-use crate::diagnosis::spread::scans::{CHANNELS, Scan, actual, in_view, scans, targets};
+use crate::diagnosis::spread::scans::{
+    CHANNELS, Scan, actual, in_view, median_spread, predicted, scans, targets,
+};
 use crate::diagnosis::unit::Unit;
 use crate::sensors::At;
 use crate::track::median_step;
 
 /// Parameters: constant, by range, by squared bearing.
 const CONSTANT: usize = 0;
-/// A target closer than this many declared sigmas to the border of the view may be outside.
+/// A target closer than this many sigmas to the border of the view may be outside.
 const MARGIN_SIGMAS: f64 = 3.0;
 /// So many instants without any sighting in a row are a sensor that is off.
 const MOST_SILENT: f64 = 25.0;
@@ -145,19 +146,18 @@ fn collect(
     if own.is_empty() {
         return;
     }
-    let sigmas = [unit.nominal.nominal.range_sigma_m, unit.nominal.nominal.bearing_sigma_rad];
+    let sigmas = spreads(unit, model, kind, &own);
     let margins = sigmas.map(|sigma| MARGIN_SIGMAS * sigma);
     for (time_s, scan) in instants(unit, &own) {
         let Some(at) = At::new(unit.evidence, unit.robot, track, time_s) else { continue };
-        let instant = &at.plain();
         for (target, seen) in targets(unit, kind, time_s) {
-            if !in_view(unit, model, instant, &seen, margins) {
+            if !in_view(unit, model, &at, &seen, margins) {
                 continue;
             }
-            let predicted = predict::sighting(model, instant, &seen);
+            let predicted = predicted(unit, model, &at, &seen);
             let reported = scan.is_some_and(|scan| {
                 scan.readings.iter().any(|reading| {
-                    let (errors, _) = reading.errors(model, &seen);
+                    let (errors, _) = reading.errors(unit, model, &seen);
                     let near = |(error, sigma): (&Option<f64>, f64)| {
                         error.is_none_or(|error| error.abs() < GATE * sigma)
                     };
@@ -169,6 +169,22 @@ fn collect(
             places.push(Place { unit: position, time_s, channel: CHANNELS[kind][0] });
         }
     }
+}
+
+/// The spreads of ranges and bearings about what is predicted for the names they bear.
+fn spreads(unit: &Unit<'_>, model: &RobotModel<f64>, kind: usize, own: &[Scan<'_>]) -> [f64; 2] {
+    let mut sizes = [Vec::new(), Vec::new()];
+    for scan in own {
+        let targets = targets(unit, kind, scan.time_s);
+        for reading in &scan.readings {
+            let named = actual(model, reading);
+            let Some((_, seen)) = targets.iter().find(|(target, _)| *target == named) else { continue };
+            for (sizes, error) in sizes.iter_mut().zip(reading.errors(unit, model, seen).0) {
+                sizes.extend(error.map(f64::abs));
+            }
+        }
+    }
+    sizes.map(|mut sizes| median_spread(&mut sizes).unwrap_or(0.0))
 }
 
 /// When the sensor looked, with what it saw of a kind.

@@ -106,6 +106,9 @@ pub(crate) struct Explained {
     pub(crate) part: Option<f64>,
 }
 
+/// Makes a likelihood of units.
+type Build<'f> = dyn for<'u, 'a> Fn(&[&'u Unit<'a>]) -> Option<Family<'u, 'a>> + 'f;
+
 /// Effects that are looked for together.
 #[derive(Clone, Copy)]
 enum Group {
@@ -125,29 +128,40 @@ impl Group {
         }
     }
 
-    fn spread(self, units: &[&Unit<'_>], fit: &Fit, robot: RobotId, tests: usize) -> Spread {
-        let of_family = |family: Option<Family<'_, '_>>| {
-            family.map_or_else(Spread::default, |family| of_family(&family, fit, robot, tests))
+    /// What one robot shows, with gains on the held units if there are any.
+    fn spread(
+        self,
+        units: &[&Unit<'_>],
+        held: &[&Unit<'_>],
+        fit: &Fit,
+        robot: RobotId,
+        tests: usize,
+    ) -> Spread {
+        let of_family = |build: &Build<'_>| {
+            let (own, held) = (build(units), build(held));
+            own.map_or_else(Spread::default, |own| of_family(&own, held.as_ref(), fit, robot, tests))
         };
         match self {
             Self::Sightings => {
-                let mut all = of_family(sighted::family(units, fit));
+                let mut all = of_family(&|units| sighted::family(units, fit));
                 let mixed = all.terms.iter().map(|own| &own.judged.estimated[0].term);
                 let mixed =
                     mixed.filter(|term| term.effect == Effect::IdentityMixUp).map(|term| term.values[0]);
                 let displaced = sighted::displaced(units, mixed.sum());
-                all.join(of_family(missed::family(units, fit, displaced)));
+                all.join(of_family(&|units| missed::family(units, fit, displaced)));
                 all
             }
-            Self::Gyro => of_family(walk::family(units, fit)),
-            Self::Commands => of_family(executed::family(units, fit)),
+            Self::Gyro => of_family(&|units| walk::family(units, fit)),
+            Self::Commands => of_family(&|units| executed::family(units, fit)),
         }
     }
 }
 
-/// Looks for effects of spread among the entries, beside a fit of the mean and among so many tests.
+/// Looks for effects of spread among the entries, beside a fit of the mean and among so many tests; `held` are
+/// units of other recordings to test on.
 pub(crate) fn spread(
     units: &[&Unit<'_>],
+    held: &[&Unit<'_>],
     fit: &Fit,
     entries: &[Entry],
     swaps: &Swaps,
@@ -162,8 +176,9 @@ pub(crate) fn spread(
             }
         }
     }
-    let parts =
-        parallel::map(&jobs, |&(robot, group)| group.spread(&of_robot(units, robot), fit, robot, tests));
+    let parts = parallel::map(&jobs, |&(robot, group)| {
+        group.spread(&of_robot(units, robot), &of_robot(held, robot), fit, robot, tests)
+    });
     let mut all = Spread { terms: swaps.terms(tests), ..Spread::default() };
     for part in parts {
         all.join(part);
@@ -184,9 +199,20 @@ impl Spread {
     }
 }
 
-fn of_family(family: &Family<'_, '_>, fit: &Fit, robot: RobotId, tests: usize) -> Spread {
+fn of_family(
+    family: &Family<'_, '_>,
+    held: Option<&Family<'_, '_>>,
+    fit: &Fit,
+    robot: RobotId,
+    tests: usize,
+) -> Spread {
     let base = family.base();
-    let shows = family.select(&base, tests);
+    let mut shows = family.select(&base, tests);
+    if let Some(held) = held {
+        for shows in &mut shows {
+            shows.gain = Family::gain_in(held, &shows.with, &shows.without);
+        }
+    }
     let found: Vec<Effect> = shows.iter().map(|own| family.members[own.member].effect).collect();
     let mut own =
         Spread { undetected: judge::undetected(family, &base, &found, robot, tests), ..Spread::default() };

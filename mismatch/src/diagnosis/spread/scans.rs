@@ -3,12 +3,15 @@
 use pleiad_estimation::LandmarkId;
 use pleiad_estimation::sample::Target;
 use pleiad_physics::chain::sensors::Seen;
-use pleiad_physics::predict::{self, Instant};
-use pleiad_physics::{RobotModel, Scalar};
+use pleiad_physics::{RobotModel, Scalar, signal};
 
 use crate::channel::Channel;
 use crate::diagnosis::unit::Unit;
+use crate::sensors::At;
 use crate::sightings::{self, Sighted, seen};
+
+/// The median size of a normal error times this is its standard deviation.
+const NORMAL_OVER_MEDIAN: f64 = 1.482_602_218_505_602;
 
 /// Landmarks, robots: the channels of their ranges and bearings.
 pub(super) const CHANNELS: [[Channel; 2]; 2] = [
@@ -26,12 +29,28 @@ pub(super) struct Reading<'s> {
 
 impl Reading<'_> {
     /// Range and bearing minus those predicted for a target, and the range predicted.
-    pub(super) fn errors(&self, model: &RobotModel<f64>, seen: &Seen) -> ([Option<f64>; 2], f64) {
-        let predicted = predict::sighting(model, &self.sighted.at.plain(), seen);
+    pub(super) fn errors(
+        &self,
+        unit: &Unit<'_>,
+        model: &RobotModel<f64>,
+        seen: &Seen,
+    ) -> ([Option<f64>; 2], f64) {
+        let predicted = predicted(unit, model, &self.sighted.at, seen);
         let range = self.measured[0].map(|range_m| range_m - predicted.range_m);
         let bearing = self.measured[1].map(|bearing_rad| (bearing_rad - predicted.bearing_rad).wrapped());
         ([range, bearing], predicted.range_m)
     }
+}
+
+/// Range and bearing of a target.
+pub(super) fn predicted(
+    unit: &Unit<'_>,
+    model: &RobotModel<f64>,
+    at: &At,
+    seen: &Seen,
+) -> signal::Sighting<f64> {
+    let track = &unit.evidence.tracks[&unit.robot];
+    sightings::predicted(unit.evidence, (track, at), seen, model)
 }
 
 /// Sightings of one kind of target at one instant.
@@ -94,18 +113,26 @@ pub(super) fn targets(unit: &Unit<'_>, kind: usize, time_s: f64) -> Vec<(Target,
         .collect()
 }
 
+/// The spread of errors by the median of their sizes, which are reordered; `None` without errors, or where most
+/// are zero.
+pub(super) fn median_spread(sizes: &mut [f64]) -> Option<f64> {
+    sizes.sort_by(f64::total_cmp);
+    let middle = *sizes.get(sizes.len() / 2)?;
+    (middle > 0.0).then_some(NORMAL_OVER_MEDIAN * middle)
+}
+
 /// Whether the declared sensor has a target in view at an instant, by this margin of range and bearing; yes if
 /// none is declared.
 pub(super) fn in_view(
     unit: &Unit<'_>,
     model: &RobotModel<f64>,
-    instant: &Instant,
+    at: &At,
     seen: &Seen,
     margins: [f64; 2],
 ) -> bool {
     let Some(nominal) = &unit.evidence.recording.nominal else { return true };
     let sensor = &nominal.range_sensor;
-    let predicted = predict::sighting(model, instant, seen);
+    let predicted = predicted(unit, model, at, seen);
     let half_fov_rad = sensor.half_fov_rad;
     predicted.range_m > sensor.min_range_m + margins[0]
         && predicted.range_m < sensor.max_range_m - margins[0]

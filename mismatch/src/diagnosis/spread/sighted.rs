@@ -18,7 +18,7 @@ use crate::diagnosis::fit::Fit;
 use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
-use crate::diagnosis::spread::scans::{CHANNELS, actual, in_view, repeats, scans, targets};
+use crate::diagnosis::spread::scans::{CHANNELS, actual, in_view, median_spread, repeats, scans, targets};
 use crate::diagnosis::unit::Unit;
 
 /// Parameters: the logarithms of the least sigma, of range and bearing, to landmarks and to robots.
@@ -66,6 +66,14 @@ impl Sightings {
     }
 }
 
+/// Of the errors of a range and a bearing, where they are there.
+fn log_density(errors: &[Option<f64>; 2], sigmas: [f64; 2], student: Student) -> f64 {
+    let part = |(error, sigma): (&Option<f64>, f64)| {
+        error.map_or(0.0, |error| student.log_density(error / sigma, sigma))
+    };
+    errors.iter().zip(sigmas).map(part).sum()
+}
+
 impl Density for Sightings {
     fn rows(&self) -> usize {
         self.rows.len()
@@ -81,17 +89,11 @@ impl Density for Sightings {
         let (own, other) = (libm::log1p(-mixed), libm::log(mixed));
         for (row, value) in self.rows.iter().zip(into) {
             let sigmas = Self::sigmas(row, parameters);
-            let of = |errors: &[Option<f64>; 2]| -> f64 {
-                let part = |(error, sigma): (&Option<f64>, &f64)| {
-                    error.map_or(0.0, |error| student.log_density(error / sigma, *sigma))
-                };
-                errors.iter().zip(&sigmas).map(part).sum()
-            };
-            let named = of(&row.errors);
-            *value = named;
+            *value = log_density(&row.errors, sigmas, student);
             if row.choices > 0 && mixed > 0.0 {
-                let others = row.others.iter().map(of).fold(f64::NEG_INFINITY, log_sum);
-                *value = log_sum(own + named, other + others - libm::log(row.choices as f64));
+                let others = row.others.iter().map(|errors| log_density(errors, sigmas, student));
+                let others = others.fold(f64::NEG_INFINITY, log_sum);
+                *value = log_sum(own + *value, other + others - libm::log(row.choices as f64));
             }
         }
     }
@@ -111,9 +113,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
     let spread = |kind: usize, part: usize| -> Option<f64> {
         let own = rows.iter().filter(|row| row.kind == kind);
         let mut sizes: Vec<f64> = own.filter_map(|row: &Row| row.errors[part].map(f64::abs)).collect();
-        sizes.sort_by(f64::total_cmp);
-        let middle = *sizes.get(sizes.len() / 2)?;
-        (middle > 0.0).then_some(1.4826 * middle)
+        median_spread(&mut sizes)
     };
     let spreads = [spread(0, 0), spread(0, 1), spread(1, 0), spread(1, 1)];
     for row in &mut rows {
@@ -247,15 +247,15 @@ fn collect(
             for own in &scan.readings {
                 let named = actual(model, own);
                 let Some((_, seen)) = targets.iter().find(|(target, _)| *target == named) else { continue };
-                let (errors, range_m) = own.errors(model, seen);
+                let (errors, range_m) = own.errors(unit, model, seen);
                 if !errors.iter().flatten().all(|error| error.is_finite()) {
                     continue;
                 }
                 let others = targets.iter().filter(|(target, _)| *target != named);
-                let instant = &own.sighted.at.plain();
+                let at = &own.sighted.at;
                 let choices = if repeats {
                     scan.readings.len() - 1
-                } else if others.clone().any(|(_, seen)| in_view(unit, model, instant, seen, [0.0; 2])) {
+                } else if others.clone().any(|(_, seen)| in_view(unit, model, at, seen, [0.0; 2])) {
                     scan.readings.len()
                 } else {
                     0
@@ -265,7 +265,7 @@ fn collect(
                     range_m,
                     yaw_rate_rad_s: own.sighted.at.motion.yaw_rate_rad_s,
                     errors,
-                    others: others.map(|(_, seen)| own.errors(model, seen).0).collect(),
+                    others: others.map(|(_, seen)| own.errors(unit, model, seen).0).collect(),
                     choices,
                 });
                 let channel = channels[usize::from(own.measured[0].is_none())];

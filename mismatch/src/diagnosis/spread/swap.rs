@@ -177,11 +177,11 @@ fn gains(units: &[&Unit<'_>]) -> BTreeMap<(u32, u32), Vec<Vec<f64>>> {
             let block = (((scan.time_s - unit.span_s.0) / BLOCK_S).max(0.0) as usize).min(unit.blocks);
             for reading in &scan.readings {
                 let Target::Landmark(named) = reading.sighted.target else { continue };
-                let own = penalty(reading.errors(model, &reading.sighted.seen).0);
+                let own = penalty(reading.errors(unit, model, &reading.sighted.seen).0);
                 for (target, seen) in &landmarks {
                     let Target::Landmark(other) = target else { continue };
                     if *other != named {
-                        let gain = own - penalty(reading.errors(model, seen).0);
+                        let gain = own - penalty(reading.errors(unit, model, seen).0);
                         let known = gains.entry((named.0, other.0)).or_insert_with(|| blank.clone());
                         known[position][block] += gain;
                     }

@@ -164,3 +164,38 @@ fn error(changes: &[Change], tick_rad: f64) -> f64 {
     }
     (residual / changes.len() as f64 / square).sqrt() / tick_rad
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Changes of an angle that swings, read in whole ticks and written with five decimals.
+    fn read(ticks_per_rev: f64) -> Vec<Change> {
+        let tick_rad = std::f64::consts::TAU / ticks_per_rev;
+        let angle = |index: u32| {
+            let time_s = 0.02 * f64::from(index);
+            let exact = 30.0 * (0.3 * time_s).sin() + 2.0 * time_s;
+            let read = if ticks_per_rev > 0.0 { tick_rad * (exact / tick_rad).floor() } else { exact };
+            (read * 1e5).round() / 1e5
+        };
+        let change = |index| Change { unit: 0, time_s: 0.0, by_rad: angle(index + 1) - angle(index) };
+        (0..3000).map(change).filter(|change| change.by_rad != 0.0).collect()
+    }
+
+    #[test]
+    fn ticks_are_counted_through_decimals() {
+        for ticks_per_rev in [24.0, 64.0, 1024.0, 2048.0] {
+            let changes = read(ticks_per_rev);
+            let tick_rad = tick(&changes).unwrap();
+            let found = std::f64::consts::TAU / tick_rad;
+            let error = error(&changes, tick_rad).max(LEAST_ERROR) * found;
+            assert!((found - ticks_per_rev).abs() < 3.0 * error, "{found} +- {error}");
+        }
+    }
+
+    #[test]
+    fn angles_that_are_not_counted_have_no_tick() {
+        assert!(tick(&read(0.0)).is_none_or(|tick_rad| tick_rad < 2e-5), "but for the decimals");
+        assert!(tick(&read(64.0)[..20]).is_none(), "too few");
+    }
+}

@@ -159,3 +159,36 @@ pub(super) fn explained(family: &Family<'_, '_>, walk: &Shows, fit: &Fit) -> Vec
         .map(|(position, _)| Explained { position, by: Effect::GyroRandomWalk, part: None })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+
+    #[test]
+    fn innovations_have_the_density_of_the_whole() {
+        let times = [0.0, 0.5, 1.0, 1.7, 2.2];
+        let residuals = [0.3, -0.1, 0.4, 0.9, 0.5];
+        let mut rows = Vec::new();
+        for (index, residual) in residuals.iter().enumerate() {
+            let step_s = index.checked_sub(1).map(|before| times[index] - times[before]);
+            rows.push((step_s, times[index], *residual));
+        }
+        let readings = Readings { rows, blocks: vec![0; 5] };
+        let (sigma, first, walk, warm, constant_s, unknown) = (0.4_f64, 0.1, 0.09, 0.2, 1.5_f64, 0.25);
+        let mut values = vec![0.0; 5];
+        readings.fill(&[sigma.ln(), first, walk, warm, constant_s.ln(), unknown], &mut values);
+        // cov(i, j) = unknown + walk min(t_i, t_j) + sigma^2 where i = j.
+        let covariance = DMatrix::from_fn(5, 5, |i, j| {
+            unknown + walk * times[i].min(times[j]) + if i == j { sigma * sigma } else { 0.0 }
+        });
+        let mean = |time_s: f64| first + warm * (1.0 - (-time_s / constant_s).exp());
+        let error = DVector::from_fn(5, |i, _| residuals[i] - mean(times[i]));
+        let factor = covariance.cholesky().unwrap();
+        let square = error.dot(&factor.solve(&error));
+        let log_determinant: f64 = factor.l().diagonal().iter().map(|own| 2.0 * own.ln()).sum();
+        let expected = -0.5 * (square + log_determinant + 5.0 * std::f64::consts::TAU.ln());
+        assert!((values.iter().sum::<f64>() - expected).abs() < 1e-12);
+    }
+}
