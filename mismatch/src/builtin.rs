@@ -15,6 +15,10 @@ use crate::model::nominal_models;
 const RANGE_SIGMA_M: f64 = 0.1;
 /// Its bearing noise, radians.
 const BEARING_SIGMA_RAD: f64 = 0.04;
+/// Radius of the wheels of an iRobot Create, the robot of MRCLAM, metres.
+const WHEEL_RADIUS_M: f64 = 0.033;
+/// Distance between them, metres: 258 mm in its Open Interface.
+const TRACK_WIDTH_M: f64 = 0.258;
 
 /// The model of every robot that recorded: by `nominal.toml`, or without one, where odometry is velocity
 /// commands, the unicycle that does at once what it is told.
@@ -34,9 +38,10 @@ fn is_commanded(robot: &RobotRecording) -> bool {
     !robot.odometry.is_empty() && robot.odometry.iter().all(|sample| velocity(&sample.reading))
 }
 
-/// From commands to the body the wheels' geometry cancels, so radius and track are of unit length.
+/// From commands to the body the wheels' geometry cancels. What acts on a wheel alone, such as a limit of its
+/// speed, does not: it needs a geometry like the robot's, or effects are tried that no robot could show.
 fn unicycle() -> RobotModel<f64> {
-    let mut nominal = Nominal::ideal(1.0, 1.0);
+    let mut nominal = Nominal::ideal(WHEEL_RADIUS_M, TRACK_WIDTH_M);
     nominal.range_sigma_m = RANGE_SIGMA_M;
     nominal.bearing_sigma_rad = BEARING_SIGMA_RAD;
     RobotModel::nominal(Drive::Differential, nominal)

@@ -49,8 +49,8 @@ impl At {
         Some(Self { time_s, motion: motion(&regime, pose), surroundings, regime, pose, reference, on_path })
     }
 
-    /// The instant alone: velocities are taken for constant.
-    pub(crate) fn plain(&self) -> Instant<'static> {
+    /// The instant for a model that leaves the reference alone.
+    pub(crate) fn bare(&self) -> Instant<'static> {
         let Self { time_s, motion, surroundings, .. } = *self;
         Instant { time_s, motion, surroundings, anchor: None, target: None }
     }
@@ -59,7 +59,7 @@ impl At {
     pub(crate) fn instant<'a>(&self, track: &'a Track) -> Instant<'a> {
         let (time_s, pose) = self.reference;
         let anchor = self.on_path.map(|on_path| Anchor { time_s, pose, path: track.path(), on_path });
-        Instant { anchor, ..self.plain() }
+        Instant { anchor, ..self.bare() }
     }
 }
 
@@ -109,11 +109,7 @@ pub(crate) fn heading_plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Head
 }
 
 /// Position, in the robot's true frame: forward and left.
-pub(crate) fn gps<S: Scalar>(
-    track: &Track,
-    plan: &Plan<Fix>,
-    model: &RobotModel<S>,
-) -> ChannelResiduals<S> {
+pub(crate) fn gps<S: Scalar>(track: &Track, plan: &Plan<Fix>, model: &RobotModel<S>) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(Channel::Gps, plan);
     let sigma = model.nominal.gps_sigma_m;
     for Fix { at, measured_m: [x_m, y_m] } in &plan.items {

@@ -1,7 +1,7 @@
 //! Ranges and bearings against their prediction from the true poses.
 
-use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_estimation::sample::{Reading, Relative, Target};
+use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_physics::chain::sensors::{self as chain, Seen};
 use pleiad_physics::predict::{self, Instant, Path};
 use pleiad_physics::{Context, Effect, RobotModel, Scalar, signal};
@@ -108,17 +108,18 @@ pub(crate) fn residuals<S: Scalar>(
     let mut channel = ChannelResiduals::planned(channel, plan);
     let renamed = renames(model);
     for own in &plan.items {
-        let at = &own.at;
-        let plain = at.instant(track);
-        let other = renamed.then(|| actual(model, &plain, own.target)).filter(|other| *other != own.target);
-        let target = other.unwrap_or(own.target);
-        let other = other.and_then(|other| seen(evidence, other, at.time_s).ok());
-        let path = match target {
-            Target::Robot(robot) => evidence.tracks.get(&robot).and_then(|track| track.path_in_map(at.time_s)),
+        let path_of = |target: Target| match target {
+            Target::Robot(other) => evidence.tracks.get(&other)?.path_in_map(own.at.time_s),
             Target::Landmark(_) => None,
         };
-        let instant = &Instant { target: path.as_ref().map(|path| path as &dyn Path), ..plain };
-        let predicted = predict::sighting(model, instant, other.as_ref().unwrap_or(&own.seen));
+        let plain = own.at.instant(track);
+        let other = renamed.then(|| actual(model, &plain, own.target)).filter(|other| *other != own.target);
+        let other = other.and_then(|other| Some((other, seen(evidence, other, plain.time_s).ok()?)));
+        let (target, seen) = other.as_ref().map_or((own.target, &own.seen), |(target, seen)| (*target, seen));
+        let path = path_of(target);
+        let target = path.as_ref().map(|path| path as &dyn Path);
+        let instant = &Instant { target, ..plain };
+        let predicted = predict::sighting(model, instant, seen);
         let context = Context {
             surroundings: instant.surroundings,
             ..Context::new(&model.nominal, instant.time_s, instant.motion.lift())

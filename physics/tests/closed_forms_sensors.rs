@@ -96,7 +96,12 @@ fn clock_offset_and_truth_latency_are_opposite_for_one_robot() {
     }
     let window = BodyWindow::whole(&samples, Pose::identity(), Surroundings::default());
     let change = |effect, value: f64| {
-        let pose = truth_change(&case(effect, &[value]).model, &window, window.stamps_s(), &mut BodyState::default());
+        let pose = truth_change(
+            &case(effect, &[value]).model,
+            &window,
+            window.stamps_s(),
+            &mut BodyState::default(),
+        );
         [pose.x_m, pose.y_m, pose.yaw_rad]
     };
     close(change(Effect::ClockOffset, 0.03), change(Effect::TruthLatency, -0.03));

@@ -48,7 +48,11 @@ pub fn mean_reduction(groups: &[Vec<Pair>], block_s: f64, resamples: usize, seed
     };
     let mut means: Vec<f64> = (0..resamples).map(|_| resampled()).collect();
     means.sort_by(f64::total_cmp);
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a position among the resamples")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a position among the resamples"
+    )]
     let at = |share: f64| means[((means.len() - 1) as f64 * share).round() as usize];
     let ci95 = if means.is_empty() { [f64::NAN; 2] } else { [at(0.025), at(0.975)] };
     Reduction { mean: mean(groups.iter().filter(|group| !group.is_empty()).map(reduction)), ci95 }
@@ -60,6 +64,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Pairs in the order of time, cut wherever another block of time begins.
+#[allow(clippy::float_cmp, reason = "whole numbers")]
 fn blocks(pairs: &[Pair], block_s: f64) -> Vec<&[Pair]> {
     let Some(first) = pairs.first() else { return Vec::new() };
     let number = |pair: &Pair| ((pair.time_s - first.time_s) / block_s).floor();
@@ -72,7 +77,9 @@ mod tests {
 
     /// Errors every 5 s for `count` predictions; every block of 60 s has its own size of error.
     fn group(count: u32, after: impl Fn(u32) -> f64) -> Vec<Pair> {
-        (0..count).map(|index| Pair { time_s: 5.0 * f64::from(index), before: 1.0, after: after(index) }).collect()
+        (0..count)
+            .map(|index| Pair { time_s: 5.0 * f64::from(index), before: 1.0, after: after(index) })
+            .collect()
     }
 
     #[test]

@@ -113,6 +113,7 @@ fn reorder(own: &mut RobotRecording, order: &[usize]) {
 }
 
 /// The positions of stamps, block by block in a random order.
+#[allow(clippy::float_cmp, reason = "whole numbers")]
 fn permuted(stamps: &[Timestamp], block_s: f64, random: &mut impl Rng) -> Vec<usize> {
     let Some(&first) = stamps.first() else { return Vec::new() };
     let block = |time: &Timestamp| (time.seconds_since(first) / block_s).floor();
@@ -195,7 +196,9 @@ mod tests {
 
     #[test]
     fn bent_bearings_and_biased_ranges_follow_their_formulas() {
-        assert_eq!(sighted(&bearings_bent(recording(), 0.1, 0.4)), (3.0, 0.5 + 0.05 + 0.05));
+        // 0.5 + 0.1 * 0.5 + 0.4 * 0.5^3, to rounding.
+        let (range_m, bearing_rad) = sighted(&bearings_bent(recording(), 0.1, 0.4));
+        assert!((range_m - 3.0).abs() < 1e-12 && (bearing_rad - 0.6).abs() < 1e-12);
         assert_eq!(sighted(&ranges_biased(recording(), 0.25)), (3.25, 0.5));
     }
 

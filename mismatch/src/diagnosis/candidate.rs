@@ -44,9 +44,8 @@ impl Candidate {
         });
         let inside = |row: &Row| {
             from_s.is_none_or(|from_s| row.time_s >= from_s)
-                && region.is_none_or(|region| {
-                    row.regime.pose.is_some_and(|pose| region.contains(pose.position()))
-                })
+                && region
+                    .is_none_or(|region| row.regime.pose.is_some_and(|pose| region.contains(pose.position())))
         };
         let blank = |unit: &Unit<'_>, column: &Column| {
             let part = |(part, stretch): (&Option<Vec<f64>>, &Stretch)| {
@@ -210,7 +209,8 @@ fn shown(mut term: Term, start: &Start, own: &[usize], columns: Vec<Vec<Column>>
     for (&parameter, &shows) in start.along.iter().zip(&shows) {
         term.free[parameter] = term.free[parameter] && shows;
     }
-    let along = start.along.iter().zip(&shows).filter(|(_, shows)| **shows).map(|(index, _)| *index).collect();
+    let along =
+        start.along.iter().zip(&shows).filter(|(_, shows)| **shows).map(|(index, _)| *index).collect();
     let keep = |columns: Vec<Column>| -> Vec<Column> {
         columns.into_iter().zip(&shows).filter(|(_, shows)| **shows).map(|(column, _)| column).collect()
     };

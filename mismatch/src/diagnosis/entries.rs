@@ -58,7 +58,11 @@ pub(crate) fn is_shared(info: &EffectInfo) -> bool {
     let has = |name: &str| info.parameters.iter().any(|parameter| parameter.name == name);
     let own_event = has("t_on_s") || has("range_m");
     let reference_clock = info.channels == [Needed::Truth] && info.stage == Stage::Sensor && has("latency_s");
-    (info.stage == Stage::World && !own_event) || has("region_m") || has("id") || has("ids") || reference_clock
+    (info.stage == Stage::World && !own_event)
+        || has("region_m")
+        || has("id")
+        || has("ids")
+        || reference_clock
 }
 
 /// Why an effect cannot be tested on a unit.
@@ -81,7 +85,11 @@ fn obstacle(effect: Effect, unit: &Unit<'_>) -> Option<String> {
         .collect::<BTreeSet<String>>()
         .into_iter()
         .collect();
-    let missing = if reasons.is_empty() { "nothing to compare it with was recorded".to_owned() } else { reasons.join("; ") };
+    let missing = if reasons.is_empty() {
+        "nothing to compare it with was recorded".to_owned()
+    } else {
+        reasons.join("; ")
+    };
     Some(missing)
 }
 

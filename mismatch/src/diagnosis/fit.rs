@@ -113,7 +113,7 @@ pub(crate) fn fit(
     effort: Effort,
 ) -> Option<Fit> {
     let states = states(units, &terms)?;
-    fit_from(units, terms, states, movable, effort)
+    Some(fit_from(units, terms, states, movable, effort))
 }
 
 /// The same from what the units look like under the terms.
@@ -123,7 +123,7 @@ pub(crate) fn fit_from(
     states: Vec<State>,
     movable: &dyn Fn(usize) -> bool,
     effort: Effort,
-) -> Option<Fit> {
+) -> Fit {
     let (mut terms, mut states) = (terms, states);
     let mut slots = free_slots(&terms, movable);
     let mut found = all_columns(units, &terms, &slots);
@@ -154,7 +154,7 @@ pub(crate) fn fit_from(
         }
     }
     let log_likelihood = states.iter().map(|state| state.noise.log_likelihood).sum();
-    Some(Fit { terms, states, slots, columns: found, log_likelihood })
+    Fit { terms, states, slots, columns: found, log_likelihood }
 }
 
 struct Step {
@@ -242,10 +242,8 @@ pub(crate) fn columns(unit: &Unit<'_>, terms: &[Term], slots: &[Slot]) -> Vec<Co
         }
         // The slots of a term go together: they touch the same channels.
         let own: Vec<usize> = (0..slots.len()).filter(|&slot| slots[slot].0 == index).collect();
-        let variables: Vec<Variable> = own
-            .iter()
-            .map(|&slot| Variable::Effect { index: position, parameter: slots[slot].1 })
-            .collect();
+        let variables: Vec<Variable> =
+            own.iter().map(|&slot| Variable::Effect { index: position, parameter: slots[slot].1 }).collect();
         let found = unit.columns(&model, &variables, &|channel| touches(term.effect, channel));
         for (slot, column) in own.into_iter().zip(found) {
             all[slot] = column;
@@ -311,8 +309,9 @@ impl Normal {
         let size = self.gradient.len();
         let scale: Vec<f64> =
             (0..size).map(|slot| self.information[(slot, slot)].sqrt().max(f64::MIN_POSITIVE)).collect();
-        let mut scaled =
-            DMatrix::from_fn(size, size, |row, column| self.information[(row, column)] / scale[row] / scale[column]);
+        let mut scaled = DMatrix::from_fn(size, size, |row, column| {
+            self.information[(row, column)] / scale[row] / scale[column]
+        });
         for slot in 0..size {
             scaled[(slot, slot)] += damping;
         }

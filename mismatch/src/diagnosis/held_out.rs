@@ -76,8 +76,7 @@ pub(crate) fn cross_fitted(units: &[&Unit<'_>], with: &Fit, without: &Fit) -> Ga
     for number in 0..FOLDS {
         let (_, with) = left_out(units, with, number);
         let (_, without) = left_out(units, without, number);
-        for ((unit, blocks), (with, without)) in
-            units.iter().zip(&mut blocks).zip(with.iter().zip(&without))
+        for ((unit, blocks), (with, without)) in units.iter().zip(&mut blocks).zip(with.iter().zip(&without))
         {
             let fold = fold(unit, number);
             add(unit, with, without, blocks, &|index| fold.contains(&unit.rows[index].time_s));

@@ -134,8 +134,7 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
         group.iter().map(|&position| Estimated::of(fit, covariance, position)).collect();
     let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
     let parameters = estimated.iter().flat_map(|own| own.errors.iter().flatten()).count().max(1);
-    let ratio =
-        2.0 * (support.with.log_likelihood - support.without.log_likelihood) / support.inflation;
+    let ratio = 2.0 * (support.with.log_likelihood - support.without.log_likelihood) / support.inflation;
     let p_ratio = upper_tail(ratio, parameters);
     let p_wald = wald(fit, covariance, group).map_or(0.0, |(wald, count)| upper_tail(wald, count));
     let p_familywise = (p_ratio.max(p_wald) * tests as f64).min(1.0);
@@ -225,9 +224,7 @@ fn changes_enough(units: &[&Unit<'_>], support: &Support) -> bool {
             let range = stretch.range();
             let in_stretch = range
                 .clone()
-                .filter(|&row| {
-                    (with.residuals[row] - without.residuals[row]).abs() > with.noise.sigma[row]
-                })
+                .filter(|&row| (with.residuals[row] - without.residuals[row]).abs() > with.noise.sigma[row])
                 .count();
             if in_stretch > 0 {
                 changed += in_stretch;

@@ -58,18 +58,20 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         let evidence = Evidence::new(recording, &models);
         prepared.push(Prepared { recording, evidence, models, tested });
     }
-    let all: Vec<Unit<'_>> = prepared
+    let mut all: Vec<Unit<'_>> = prepared
         .iter()
         .enumerate()
         .flat_map(|(index, own)| own.models.iter().map(move |(&robot, model)| (index, own, robot, model)))
         .map(|(index, own, robot, model)| unit(index, own, robot, model))
         .collect();
+    let swaps = spread::swaps(&mut all);
     let units: Vec<&Unit<'_>> =
         all.iter().filter(|unit| !prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
-    let mut entries = entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
-    let spread_entries = spread::take(&mut entries.entries);
+    let mut entries =
+        entries(&all.iter().filter(|unit| !prepared[unit.recording].tested).collect::<Vec<_>>());
+    let spread_entries = spread::take(&mut entries, &units);
 
     let mut notes = notes(&prepared, &all);
     let selected = select(&units, &entries.entries);
@@ -79,11 +81,11 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let Some(fit) = paired(&units, fit) else {
         return Ok(nothing(&prepared, entries, notes, false));
     };
-    let count = count + spread_entries.len();
+    let count = count + spread_entries.len() + swaps.tests;
     let scored = pool.scored(&units, &entries.entries, &fit);
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
-    let spread = spread::spread(&units, &fit, &spread_entries, count);
+    let spread = spread::spread(&units, &fit, &spread_entries, &swaps, count);
     spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
@@ -99,7 +101,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         }
     }
     let named = |group: &&Vec<usize>| found.iter().any(|own| own.group == **group);
-    notes.extend(groups.iter().filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
+    let unexplained = groups.iter().filter(|group| !spread.explains(group[0]));
+    notes.extend(unexplained.filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
     notes.extend(spread.nuisances());
     notes.extend(
         found
@@ -116,8 +119,11 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let mut undetected = undetected(&units, &scored, count);
     undetected.extend_from_slice(&spread.undetected);
     entries.untestable.extend_from_slice(&spread.untestable);
-    let corrected_terms: Vec<&Judged> =
-        found.iter().map(|own| &own.judged).chain(spread.found().into_iter().map(|own| &own.judged)).collect();
+    let corrected_terms: Vec<&Judged> = found
+        .iter()
+        .map(|own| &own.judged)
+        .chain(spread.found().into_iter().map(|own| &own.judged))
+        .collect();
     let names = |tested: bool| -> Vec<String> {
         prepared.iter().filter(|own| own.tested == tested).map(|own| own.recording.name.clone()).collect()
     };
@@ -161,7 +167,12 @@ fn roles(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Vec<Opti
     Ok(roles)
 }
 
-pub(crate) fn unit<'a>(index: usize, own: &'a Prepared<'a>, robot: RobotId, model: &RobotModel<f64>) -> Unit<'a> {
+pub(crate) fn unit<'a>(
+    index: usize,
+    own: &'a Prepared<'a>,
+    robot: RobotId,
+    model: &RobotModel<f64>,
+) -> Unit<'a> {
     let floors = own.recording.nominal.as_ref().map_or_else(Floors::default, |nominal| Floors {
         lateral_slip_s: nominal.noise.odometry_floor_lateral_slip_s,
         sensor_lag_s: nominal.noise.gyro_floor_lag_s,
@@ -247,8 +258,9 @@ pub(crate) fn nuisance(term: &Term) -> String {
         Whose::Everyone => "all robots".to_owned(),
     };
     let each = term.parameters().iter().zip(&term.values);
-    let values: Vec<String> =
-        each.map(|(parameter, value)| format!("{} = {value:.3e} {}", parameter.label(), parameter.unit)).collect();
+    let values: Vec<String> = each
+        .map(|(parameter, value)| format!("{} = {value:.3e} {}", parameter.label(), parameter.unit))
+        .collect();
     format!(
         "{whose}: {} ({}) is there, but too small to matter or of no use on data left out; it is no finding",
         term.effect.name(),
@@ -258,8 +270,7 @@ pub(crate) fn nuisance(term: &Term) -> String {
 
 fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgement) -> Finding {
     let info = own.judged.estimated[0].term.effect.info();
-    let robots: BTreeSet<u32> =
-        own.support.units.iter().map(|&unit| units[unit].robot.0).collect();
+    let robots: BTreeSet<u32> = own.support.units.iter().map(|&unit| units[unit].robot.0).collect();
     let robots: Vec<u32> = robots.into_iter().collect();
     let mut support_set: Vec<String> =
         own.support.members.iter().map(|effect| effect.name().to_owned()).collect();
@@ -339,7 +350,9 @@ fn overall(findings: &[Finding], units: &[&Unit<'_>]) -> Verdict {
 /// What is said where nothing could be compared.
 fn nothing(prepared: &[Prepared<'_>], entries: Entries, mut notes: Vec<String>, empty: bool) -> Diagnosis {
     if !empty {
-        notes.push("the nominal model predicts values that are no finite numbers; nothing was fitted".to_owned());
+        notes.push(
+            "the nominal model predicts values that are no finite numbers; nothing was fitted".to_owned(),
+        );
     }
     let findings = Findings {
         verdict: Verdict::Untestable,

@@ -144,11 +144,7 @@ pub(crate) fn whites<'u, 'a>(units: &[&'u Unit<'a>], fit: &'u Fit) -> Vec<White<
     each.map(|((unit, state), columns)| White::new(unit, state, columns)).collect()
 }
 
-pub(crate) fn score(
-    units: &[&Unit<'_>],
-    whites: &[White<'_, '_>],
-    candidate: &Candidate,
-) -> Option<Scored> {
+pub(crate) fn score(units: &[&Unit<'_>], whites: &[White<'_, '_>], candidate: &Candidate) -> Option<Scored> {
     let all = candidate.columns(units);
     let own: Vec<&White<'_, '_>> = all.iter().map(|(unit, _)| &whites[*unit]).collect();
     let columns: Vec<&[_]> = all.iter().map(|(_, columns)| columns.as_slice()).collect();
@@ -238,12 +234,7 @@ fn additions(
 }
 
 /// Fits the strongest rivals and gives the best of them, fitted.
-fn choose(
-    units: &[&Unit<'_>],
-    whites: &[White<'_, '_>],
-    current: &Fit,
-    rivals: &[&Scored],
-) -> Option<Fit> {
+fn choose(units: &[&Unit<'_>], whites: &[White<'_, '_>], current: &Fit, rivals: &[&Scored]) -> Option<Fit> {
     let best = rivals.first()?.step.gain;
     let close = rivals.iter().take_while(|rival| rival.step.gain > LEAST_SHARE * best).count();
     let rivals = &rivals[..close.min(RIVALS)];
@@ -314,7 +305,7 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
         terms.iter().map(|term| whose == Whose::Everyone || term.whose == whose).collect();
     let known: Vec<State> = own.iter().map(|&unit| current.states[unit].clone()).collect();
     let states = with_another(&acting, &known, &terms)?;
-    fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL)
+    Some(fit_from(&acting, terms, states, &|index| movable[index], Effort::RIVAL))
 }
 
 /// What a fit with one more term gains by Bayes' information criterion on the effective sample size; more is
@@ -332,6 +323,9 @@ fn criterion(units: &[&Unit<'_>], current: &Fit, added: &Fit, inflation: f64) ->
 
 /// The robust covariance of all fitted parameters, in the order of the slots.
 pub(crate) fn covariance(units: &[&Unit<'_>], fit: &Fit) -> Option<DMatrix<f64>> {
+    if fit.slots.is_empty() {
+        return Some(DMatrix::zeros(0, 0));
+    }
     let bare: Vec<White<'_, '_>> =
         units.iter().zip(&fit.states).map(|(unit, state)| White::new(unit, state, &[])).collect();
     let bare: Vec<&White<'_, '_>> = bare.iter().collect();

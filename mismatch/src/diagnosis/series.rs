@@ -76,7 +76,8 @@ fn partial(
     let gain = gain(unit, with, without);
     for component in 0..stretch.components {
         let indices = || stretch.range().skip(component).step_by(stretch.components);
-        let predicted: Vec<f64> = indices().map(|index| without.residuals[index] - with.residuals[index]).collect();
+        let predicted: Vec<f64> =
+            indices().map(|index| without.residuals[index] - with.residuals[index]).collect();
         if predicted.iter().all(|value| *value == 0.0) {
             continue;
         }

@@ -85,7 +85,8 @@ enum Choices {
 /// Starts of an effect for units that it would act on; onset and region are left at "off".
 pub(crate) fn starts(effect: Effect, units: &[&Unit<'_>]) -> Vec<Start> {
     let info = effect.info();
-    let choices: Vec<Choices> = info.parameters.iter().map(|parameter| choices(info, parameter, units)).collect();
+    let choices: Vec<Choices> =
+        info.parameters.iter().map(|parameter| choices(info, parameter, units)).collect();
     let off: Vec<f64> = info.parameters.iter().map(|parameter| parameter.off).collect();
     let amplitudes: Vec<usize> =
         (0..choices.len()).filter(|&index| matches!(choices[index], Choices::Amplitude)).collect();

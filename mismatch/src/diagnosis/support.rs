@@ -77,17 +77,16 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &P
 
     let whites = whites(&acting, &without);
     let mine: Vec<usize> = (0..with.slots.len()).filter(|&slot| with.slots[slot].0 >= count).collect();
-    let columns: Vec<Vec<Column>> = with
-        .columns
-        .iter()
-        .map(|columns| mine.iter().map(|&slot| columns[slot].clone()).collect())
-        .collect();
+    let columns: Vec<Vec<Column>> =
+        with.columns.iter().map(|columns| mine.iter().map(|&slot| columns[slot].clone()).collect()).collect();
     let own_step =
         step(&whites.iter().collect::<Vec<_>>(), &columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
     let inflation = own_step.as_ref().map_or(1.0, |own| own.inflation.max(1.0));
-    let own_gain = own_step.map_or(0.0, |own| own.gain);
+    // A threshold has no derivative, and so no step.
+    let own_gain = own_step.map_or(2.0 * (with.log_likelihood - without.log_likelihood), |own| own.gain);
 
-    let rescored = parallel::map(&rivals(units, full, chosen, pool), |candidate| score(&acting, &whites, candidate));
+    let rescored =
+        parallel::map(&rivals(units, full, chosen, pool), |candidate| score(&acting, &whites, candidate));
     let mut best: BTreeMap<Effect, Scored> = BTreeMap::new();
     for one in rescored.into_iter().flatten() {
         let effect = one.candidate.term.effect;

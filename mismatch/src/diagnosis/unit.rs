@@ -47,6 +47,7 @@ pub(crate) struct Row {
 
 /// The most that commands ask for.
 #[derive(Clone, Copy, Debug, Default)]
+#[allow(clippy::struct_field_names, reason = "every field is a rate and ends in its unit")]
 pub(crate) struct Demand {
     /// Of a wheel, rad/s.
     pub(crate) wheel_rad_s: f64,
@@ -62,8 +63,8 @@ impl Demand {
         let Some((_, track)) = evidence.robot(robot) else { return demand };
         let mut before_m_s = 0.0;
         for command in &track.commands {
-            let rim_m_s = command.speed_m_s.abs()
-                + 0.5 * nominal.nominal.track_width * command.yaw_rate_rad_s.abs();
+            let rim_m_s =
+                command.speed_m_s.abs() + 0.5 * nominal.nominal.track_width * command.yaw_rate_rad_s.abs();
             demand.wheel_rad_s = demand.wheel_rad_s.max(rim_m_s / nominal.nominal.wheel_radius);
             demand.speed_m_s = demand.speed_m_s.max(rim_m_s);
             demand.change_m_s = demand.change_m_s.max((command.speed_m_s - before_m_s).abs());
@@ -262,8 +263,11 @@ impl<'a> Unit<'a> {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "times since the first, at least 0")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "times since the first, at least 0"
+)]
 fn block(since_s: f64) -> usize {
     (since_s / BLOCK_S) as usize
 }
-

@@ -27,10 +27,10 @@ pub(crate) struct White<'u, 'a> {
 
 impl<'u, 'a> White<'u, 'a> {
     pub(crate) fn new(unit: &'u Unit<'a>, state: &State, columns: &[Column]) -> Self {
-        let factor =
-            |(residual, sigma): (&f64, &f64)| noise::weight(residual / sigma).sqrt() / sigma;
+        let factor = |(residual, sigma): (&f64, &f64)| noise::weight(residual / sigma).sqrt() / sigma;
         let factors: Vec<f64> = state.residuals.iter().zip(&state.noise.sigma).map(factor).collect();
-        let errors = state.residuals.iter().zip(&factors).map(|(residual, factor)| residual * factor).collect();
+        let errors =
+            state.residuals.iter().zip(&factors).map(|(residual, factor)| residual * factor).collect();
         let mut white = Self { unit, errors, factors, active: Vec::new() };
         white.active = columns.iter().map(|column| white.of(column)).collect();
         white
@@ -40,7 +40,8 @@ impl<'u, 'a> White<'u, 'a> {
     fn of(&self, column: &Column) -> Vec<Option<Vec<f64>>> {
         let part = |(part, stretch): (&Option<Vec<f64>>, &Stretch)| {
             let factors = &self.factors[stretch.range()];
-            part.as_ref().map(|part| part.iter().zip(factors).map(|(value, factor)| -value * factor).collect())
+            part.as_ref()
+                .map(|part| part.iter().zip(factors).map(|(value, factor)| -value * factor).collect())
         };
         column.parts.iter().zip(&self.unit.stretches).map(part).collect()
     }
@@ -64,6 +65,7 @@ pub(crate) struct Step {
 
 /// The best step in `columns` (one list per white unit) beside the active parameters, which follow it.
 /// `None` if there are none, or if they say nothing that the active parameters do not.
+#[allow(clippy::too_many_lines, reason = "one computation from top to bottom: Gram matrices, step, sandwich")]
 pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<Step> {
     let size = columns.first()?.len();
     if size == 0 {
@@ -126,7 +128,9 @@ pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<S
         }
     };
     // What is left of a column beside the active ones must be more than rounding.
-    if (0..size).any(|i| information[(i, i)].partial_cmp(&(1e-6 * full[i])) != Some(std::cmp::Ordering::Greater)) {
+    if (0..size)
+        .any(|i| information[(i, i)].partial_cmp(&(1e-6 * full[i])) != Some(std::cmp::Ordering::Greater))
+    {
         return None;
     }
     let scale = DVector::from_fn(size, |i, _| 1.0 / information[(i, i)].sqrt());
@@ -145,8 +149,12 @@ pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<S
             let range = stretch.range();
             let shown: Vec<(usize, &[f64])> =
                 own.iter().enumerate().filter_map(|(i, a)| Some((i, a[which].as_deref()?))).collect();
-            let active: Vec<(usize, &[f64])> =
-                white.active.iter().enumerate().filter_map(|(j, b)| Some((j, b[which].as_deref()?))).collect();
+            let active: Vec<(usize, &[f64])> = white
+                .active
+                .iter()
+                .enumerate()
+                .filter_map(|(j, b)| Some((j, b[which].as_deref()?)))
+                .collect();
             if shown.is_empty() && active.is_empty() {
                 continue;
             }
@@ -182,7 +190,7 @@ pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<S
 pub(crate) fn floored(meat: &DMatrix<f64>, bread: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
     let size = bread.nrows();
     let factor = bread.clone().cholesky()?.l();
-    let inverse = factor.clone().try_inverse()?;
+    let inverse = factor.solve_lower_triangular(&DMatrix::identity(size, size))?;
     let whitened = &inverse * meat * inverse.transpose();
     let eigen = SymmetricEigen::new(0.5 * (&whitened + whitened.transpose()));
     let raised = eigen.eigenvalues.map(|value| value.max(LEAST_SHARE));

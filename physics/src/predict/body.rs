@@ -232,9 +232,8 @@ fn carried<S: Scalar>(
         let next = if forth { at.checked_add(1) } else { at.checked_sub(1) };
         let Some((next, there)) = next.and_then(|next| Some((next, window.track.get(next)?))) else {
             let behind = if forth { at.checked_sub(1).map(|from| [from, at]) } else { Some([at, at + 1]) };
-            let samples = last.or(behind).and_then(|[from, to]| {
-                Some([window.track.get(from)?, window.track.get(to)?])
-            });
+            let samples =
+                last.or(behind).and_then(|[from, to]| Some([window.track.get(from)?, window.track.get(to)?]));
             return match samples {
                 Some([from, to]) if to.time_s > from.time_s => {
                     let step = window.step(model, [from, to], pose, &mut state);

@@ -132,13 +132,13 @@ pub fn sighting<S: Scalar>(model: &RobotModel<S>, instant: &Instant<'_>, seen: &
     let map_from_sensor = carrier.before(geometry.latency_s).compose(&sensors::sensor(&geometry));
     // The target is where the reference system shows it at that instant of common time.
     let ahead_s = carrier.truth.latency_s - carrier.clock_error_s - geometry.latency_s;
-    let target_m = match instant.target.and_then(|path| along(path, None, ahead_s + instant.time_s)) {
-        Some(pose) => pose.position(),
-        None => {
-            let [x_m, y_m] = geometry.target_m;
-            let [x_m_s, y_m_s] = seen.velocity_m_s;
-            [x_m + ahead_s * x_m_s, y_m + ahead_s * y_m_s]
-        }
+    let there = instant.target.and_then(|path| along(path, None, ahead_s + instant.time_s));
+    let target_m = if let Some(pose) = there {
+        pose.position()
+    } else {
+        let [x_m, y_m] = geometry.target_m;
+        let [x_m_s, y_m_s] = seen.velocity_m_s;
+        [x_m + ahead_s * x_m_s, y_m + ahead_s * y_m_s]
     };
     sensors::sighting_of(model, &context, map_from_sensor.point_seen(target_m))
 }

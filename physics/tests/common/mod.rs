@@ -7,8 +7,8 @@ use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::chain::robot::Robot;
 use pleiad_physics::chain::sensors::{self, Seen};
 use pleiad_physics::predict::{
-    Anchor, BodyWindow, CommandWindow, EncoderSample, Instant, Path, body_motion, commanded_truth_change, gps, heading,
-    mean_gyro, sighting, truth, truth_change, wheel_turns,
+    Anchor, BodyWindow, CommandWindow, EncoderSample, Instant, Path, body_motion, commanded_truth_change,
+    gps, heading, mean_gyro, sighting, truth, truth_change, wheel_turns,
 };
 use pleiad_physics::signal::Target;
 use pleiad_physics::{Chance, Context, Drive, Motion, Nominal, Pose, RobotModel, Scalar, Surroundings};
@@ -148,7 +148,11 @@ fn body<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
         let [first_s, last_s] = window.stamps_s();
         let stamps_s = [first_s - 0.007, last_s + 0.004];
         push_pose(out, &format!("body {from_s:.2}"), body_motion(model, &window, &mut states[0]));
-        push_pose(out, &format!("truth change {from_s:.2}"), truth_change(model, &window, stamps_s, &mut states[1]));
+        push_pose(
+            out,
+            &format!("truth change {from_s:.2}"),
+            truth_change(model, &window, stamps_s, &mut states[1]),
+        );
         out.push((format!("gyro {from_s:.2}"), mean_gyro(model, &window, &mut states[2])));
     }
 }

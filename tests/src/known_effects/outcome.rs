@@ -48,6 +48,7 @@ pub struct Row {
 }
 
 impl Outcome {
+    #[allow(clippy::float_cmp, reason = "the off value itself")]
     pub(super) fn new(case: &Case, fits: Vec<Option<KnownFit>>) -> Self {
         let seeds = fits.len();
         let fits: Vec<KnownFit> = fits.into_iter().flatten().collect();

@@ -69,13 +69,16 @@ mod tests {
             }
         }
         let near = Student::new(1e-8).log_density(2.0, 0.5) - gaussian(2.0, 0.5);
-        assert!(near.abs() < 1e-6 && Student::new(0.0).log_density(2.0, 0.5) == gaussian(2.0, 0.5));
+        assert!(
+            near.abs() < 1e-6 && (Student::new(0.0).log_density(2.0, 0.5) - gaussian(2.0, 0.5)).abs() < 1e-15
+        );
     }
 
     #[test]
     fn sums_of_logarithms_do_not_overflow() {
         assert!((log_sum(-1000.0, -1000.0) - (-1000.0 + 2.0_f64.ln())).abs() < 1e-12);
-        assert_eq!(log_sum(3.0, f64::NEG_INFINITY), 3.0);
-        assert_eq!(log_sum(f64::NEG_INFINITY, f64::NEG_INFINITY), f64::NEG_INFINITY);
+        assert!((log_sum(3.0, f64::NEG_INFINITY) - 3.0).abs() < 1e-15);
+        let nothing = log_sum(f64::NEG_INFINITY, f64::NEG_INFINITY);
+        assert!(nothing.is_infinite() && nothing < 0.0);
     }
 }

@@ -17,15 +17,18 @@ use pleiad_physics::{Effect, RobotModel};
 
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
+use crate::diagnosis::naming::NEAR_END;
+use crate::diagnosis::spread::Explained;
 use crate::diagnosis::spread::density::{bounded, log_sum};
-use crate::diagnosis::spread::family::{Family, Member, Place, Shown, blocks};
+use crate::diagnosis::spread::family::{Family, Member, Place, Shown, Shows, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
+use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::Unit;
 
 /// Logarithms of the white noise of both components.
 const NOISE: usize = 0;
 /// A delay of all commands, seconds.
-pub(super) const DELAY: usize = 2;
+const DELAY: usize = 2;
 /// The square of the jitter's greatest delay.
 const JITTER: usize = 3;
 /// The logarithm of the probability of a loss.
@@ -211,9 +214,9 @@ fn collect(
                 let reached = |since_s| reached(since_s, constants_s[part]);
                 -change.by[part] * (reached(ended_s) - reached(begun_s))
             });
-            for part in 0..2 {
-                row.delayed[part] += delayed[part];
-                row.agitation[part] += delayed[part] * delayed[part];
+            for ((sum, agitation), delayed) in row.delayed.iter_mut().zip(&mut row.agitation).zip(delayed) {
+                *sum += delayed;
+                *agitation += delayed * delayed;
             }
             if let Some(late_s) = change.late_s {
                 row.lost.push([0, 1].map(|part: usize| {
@@ -224,7 +227,11 @@ fn collect(
             }
         }
         rows.push(row);
-        places.push(Place { unit: position, time_s: f64::midpoint(from_s, to_s), channel: Channel::Actuator });
+        places.push(Place {
+            unit: position,
+            time_s: f64::midpoint(from_s, to_s),
+            channel: Channel::Actuator,
+        });
     }
 }
 
@@ -271,4 +278,26 @@ fn reached(since_s: f64, constant_s: f64) -> f64 {
 /// The time integral of the same, seconds.
 fn turned(since_s: f64, constant_s: f64) -> f64 {
     if since_s > 0.0 { since_s - constant_s * reached(since_s, constant_s) } else { 0.0 }
+}
+
+/// What a random timing explains of a delay in the mean: a jitter its half, a loss what it delays on average,
+/// which the likelihood has told apart.
+pub(super) fn explained(family: &Family<'_, '_>, shows: &Shows, by: Effect, fit: &Fit) -> Vec<Explained> {
+    let parameters = &shows.with.parameters;
+    let jitter_s = parameters[JITTER].sqrt();
+    let half_s = if by == Effect::CommandJitter { 0.5 * jitter_s } else { 0.0 };
+    let variance = |index: usize| shows.known.between(index, index).unwrap_or(0.0);
+    let half_error_s = if half_s > 0.0 { 0.25 * variance(JITTER).sqrt() / jitter_s } else { 0.0 };
+    let error_s = variance(DELAY).sqrt().hypot(half_error_s);
+    let own = |term: &Term| {
+        term.effect == Effect::CommandDelay && family.units.iter().all(|unit| term.acts_on(unit.robot))
+    };
+    let floors = family.units.first().map(|unit| unit.floors).unwrap_or_default();
+    let judged = |(position, term): (usize, &Term)| {
+        let left_s = term.values[0] + parameters[DELAY] - half_s;
+        let threshold_s = term.parameters()[0].relevance.threshold(&floors);
+        let remains = left_s.abs() - NEAR_END * error_s > threshold_s;
+        Explained { position, by, part: remains.then_some(term.values[0] - left_s) }
+    };
+    fit.terms.iter().enumerate().filter(|(_, term)| own(term)).map(judged).collect()
 }

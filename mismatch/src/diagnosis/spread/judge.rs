@@ -4,6 +4,7 @@ use pleiad_estimation::RobotId;
 use pleiad_physics::Effect;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use crate::channel::Channel;
 use crate::diagnosis::naming::{Estimated, GAIN_ERRORS, Judged, NEAR_END};
 use crate::diagnosis::power::POWER_80;
 use crate::diagnosis::select::FAMILYWISE;
@@ -36,11 +37,20 @@ pub(super) fn judged(family: &Family<'_, '_>, shows: &Shows, robot: RobotId, tes
         total: None,
         verdict,
         p_familywise,
-        channel: shows.channel,
+        channel: channel(member.effect, shows.channel),
         place: Place::default(),
         one_off: false,
     };
     SpreadTerm { judged, gain: shows.gain, robots: vec![robot], support }
+}
+
+/// The channel of an effect that shows in rows of this one: a row of sightings goes by its range.
+fn channel(effect: Effect, of_rows: Channel) -> Channel {
+    match (effect, of_rows) {
+        (Effect::MotionBlur, Channel::RangeToLandmark) => Channel::BearingToLandmark,
+        (Effect::MotionBlur, Channel::RangeToRobot) => Channel::BearingToRobot,
+        _ => of_rows,
+    }
 }
 
 /// The verdict of a named effect with so many that explain it.
@@ -73,7 +83,12 @@ fn is_relevant(
             parameters.filter(|(index, _)| tested(&member.shown[*index])).any(|(index, parameter)| {
                 let threshold = parameter.relevance.threshold(&unit.floors);
                 let size = (estimated.term.values[index] - parameter.off).abs();
-                let near = |error: f64| threshold > 0.0 && size - NEAR_END * error > threshold;
+                // Of a probability the logarithm is nearer to a normal distribution.
+                let near = |error: f64| match member.shown[index] {
+                    Shown::Exp(_) => size * libm::exp(-NEAR_END * error / size) > threshold,
+                    _ => size - NEAR_END * error > threshold,
+                };
+                let near = |error: f64| threshold > 0.0 && near(error);
                 estimated.errors[index].is_some_and(near)
             })
         })
@@ -101,8 +116,11 @@ pub(super) fn undetected(
         }
         let known = if member.chances.is_some() { None } else { family.known(&[position], &there) };
         for (shown, parameter) in member.shown.iter().zip(info.parameters) {
-            let threshold =
-                family.units.iter().map(|unit| parameter.relevance.threshold(&unit.floors)).fold(0.0, f64::max);
+            let threshold = family
+                .units
+                .iter()
+                .map(|unit| parameter.relevance.threshold(&unit.floors))
+                .fold(0.0, f64::max);
             let error = |index: usize| Some(known.as_ref()?.between(index, index)?.sqrt());
             let near = NEAR_END + POWER_80;
             let size = match *shown {

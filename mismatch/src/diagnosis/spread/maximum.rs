@@ -72,7 +72,10 @@ impl Uncertainty {
             let solved = naive.cholesky()?.solve(&robust);
             Some(solved.trace() / which.len().max(1) as f64)
         };
-        self.parts(which).and_then(inflated).filter(|value| value.is_finite()).map_or(1.0, |value| value.max(1.0))
+        self.parts(which)
+            .and_then(inflated)
+            .filter(|value| value.is_finite())
+            .map_or(1.0, |value| value.max(1.0))
     }
 
     /// The Wald statistic of a departure of some parameters.
@@ -225,7 +228,8 @@ fn scores(
 fn normal(scores: &[Vec<f64>]) -> (DVector<f64>, DMatrix<f64>) {
     let size = scores.len();
     let gradient = DVector::from_fn(size, |index, _| scores[index].iter().sum());
-    let product = |row: usize, column: usize| scores[row].iter().zip(&scores[column]).map(|(a, b)| a * b).sum();
+    let product =
+        |row: usize, column: usize| scores[row].iter().zip(&scores[column]).map(|(a, b)| a * b).sum();
     let mut outer = DMatrix::zeros(size, size);
     for row in 0..size {
         for column in 0..=row {
@@ -238,11 +242,15 @@ fn normal(scores: &[Vec<f64>]) -> (DVector<f64>, DMatrix<f64>) {
 }
 
 /// The step of the parameters at these positions.
-fn step(gradient: &DVector<f64>, outer: &DMatrix<f64>, moving: &[usize], damping: f64) -> Option<DVector<f64>> {
+fn step(
+    gradient: &DVector<f64>,
+    outer: &DMatrix<f64>,
+    moving: &[usize],
+    damping: f64,
+) -> Option<DVector<f64>> {
     let size = moving.len();
     let scale: Vec<f64> = moving.iter().map(|&own| outer[(own, own)].sqrt()).collect();
-    let mut scaled =
-        DMatrix::from_fn(size, size, |i, j| outer[(moving[i], moving[j])] / scale[i] / scale[j]);
+    let mut scaled = DMatrix::from_fn(size, size, |i, j| outer[(moving[i], moving[j])] / scale[i] / scale[j]);
     for position in 0..size {
         scaled[(position, position)] += damping;
     }

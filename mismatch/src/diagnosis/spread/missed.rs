@@ -10,7 +10,7 @@
 //! The instants are the stamps of sightings, and those between them where the sensor's period says that it
 //! looked and saw nothing.
 
-use pleiad_physics::predict::{self, Instant};
+use pleiad_physics::predict;
 use pleiad_physics::{Effect, RobotModel};
 use pleiad_recording::NominalRangeSensor;
 
@@ -148,7 +148,7 @@ fn collect(
     };
     for (time_s, scan) in instants(unit, &own) {
         let Some(at) = At::new(unit.evidence, unit.robot, track, time_s) else { continue };
-        let instant: &Instant = &at.plain();
+        let instant = &at.bare();
         for (target, seen) in targets(unit, kind, time_s) {
             let predicted = predict::sighting(model, instant, &seen);
             if !in_view(predicted.range_m, predicted.bearing_rad) {
@@ -197,4 +197,3 @@ fn instants<'s, 'a>(unit: &Unit<'_>, own: &'s [Scan<'a>]) -> Vec<(f64, Option<&'
     }
     found
 }
-

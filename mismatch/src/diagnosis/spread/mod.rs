@@ -4,7 +4,7 @@
 //! A second stage, on the residuals of the fitted mean. Each group of effects that show in the same rows has a
 //! likelihood of its own ([`sighted`], [`walk`], [`executed`], [`missed`]), in which the noise levels are
 //! estimated too; [`family`] selects among its effects, [`judge`] applies the rules of evidence of the first
-//! stage, with the tests of both counted.
+//! stage, with the tests of both counted. [`ticks`] are counted and [`swap`] is looked for before the first.
 //!
 //! [`select`]: crate::diagnosis::select
 
@@ -17,6 +17,8 @@ mod missed;
 mod report;
 mod scans;
 mod sighted;
+mod swap;
+mod ticks;
 mod walk;
 
 use std::collections::BTreeSet;
@@ -24,18 +26,21 @@ use std::collections::BTreeSet;
 use pleiad_estimation::RobotId;
 use pleiad_physics::Effect;
 
+use crate::diagnosis::entries::Entries;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::held_out::Gain;
 use crate::diagnosis::naming::Judged;
 use crate::diagnosis::parallel;
 use crate::diagnosis::select::Entry;
-use crate::diagnosis::spread::family::Family;
+use crate::diagnosis::spread::family::{Family, Shows};
 use crate::diagnosis::term::Whose;
 use crate::diagnosis::unit::Unit;
 use crate::findings::{Undetected, Untestable};
 
+pub(crate) use swap::{Swaps, swaps};
+
 /// The effects that this stage estimates.
-const EFFECTS: [Effect; 7] = [
+const EFFECTS: [Effect; 10] = [
     Effect::RangeDependentNoise,
     Effect::MotionBlur,
     Effect::HeavyTails,
@@ -43,18 +48,33 @@ const EFFECTS: [Effect; 7] = [
     Effect::MissedDetections,
     Effect::GyroRandomWalk,
     Effect::CommandJitter,
+    Effect::CommandLoss,
+    Effect::EncoderCoarse,
+    Effect::LandmarkIdentitySwap,
 ];
 
-/// Whether an effect is one of spread or chance.
-pub(crate) fn is_spread(effect: Effect) -> bool {
-    EFFECTS.contains(&effect) || effect == Effect::CommandLoss
+/// Takes the entries of this stage out of those of the first, and adds what only this stage can test.
+pub(crate) fn take(entries: &mut Entries, units: &[&Unit<'_>]) -> Vec<Entry> {
+    let is_own = |entry: &Entry| EFFECTS.contains(&entry.0);
+    let (mut own, mean): (Vec<Entry>, Vec<Entry>) = entries.entries.drain(..).partition(is_own);
+    entries.entries = mean;
+    for robot in robots(units) {
+        let entry = (Effect::EncoderCoarse, Whose::Robot(robot));
+        if ticks::recorded(&of_robot(units, robot)) && !own.contains(&entry) {
+            own.push(entry);
+            let tested = |known: &Untestable| known.effect == entry.0.name() && known.robot == Some(robot.0);
+            entries.untestable.retain(|known| !tested(known));
+        }
+    }
+    own
 }
 
-/// Takes the entries of this stage out of those of the first.
-pub(crate) fn take(entries: &mut Vec<Entry>) -> Vec<Entry> {
-    let (own, mean) = entries.drain(..).partition(|(effect, _)| is_spread(*effect));
-    *entries = mean;
-    own
+fn robots(units: &[&Unit<'_>]) -> BTreeSet<RobotId> {
+    units.iter().map(|unit| unit.robot).collect()
+}
+
+fn of_robot<'u, 'a>(units: &[&'u Unit<'a>], robot: RobotId) -> Vec<&'u Unit<'a>> {
+    units.iter().copied().filter(|unit| unit.robot == robot).collect()
 }
 
 /// An effect of spread that some robots show.
@@ -73,8 +93,17 @@ pub(crate) struct Spread {
     pub(crate) terms: Vec<SpreadTerm>,
     pub(crate) undetected: Vec<Undetected>,
     pub(crate) untestable: Vec<Untestable>,
-    /// Terms of the mean that an effect of spread explains, by position, with the reason.
-    pub(crate) explained: Vec<(usize, Effect)>,
+    pub(crate) explained: Vec<Explained>,
+}
+
+/// A term of the mean of which an effect of spread explains a part, or all.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Explained {
+    /// The position of the term in the fit.
+    pub(crate) position: usize,
+    pub(crate) by: Effect,
+    /// What it explains of the term's first parameter; `None` if nothing is left of the term.
+    pub(crate) part: Option<f64>,
 }
 
 /// The families of a robot that have effects among the entries.
@@ -90,25 +119,34 @@ const FAMILIES: [(&[Effect], Build); 4] = [
 ];
 
 /// Looks for effects of spread among the entries, beside a fit of the mean and among so many tests.
-pub(crate) fn spread(units: &[&Unit<'_>], fit: &Fit, entries: &[Entry], tests: usize) -> Spread {
-    let robots: BTreeSet<RobotId> = units.iter().map(|unit| unit.robot).collect();
+pub(crate) fn spread(
+    units: &[&Unit<'_>],
+    fit: &Fit,
+    entries: &[Entry],
+    swaps: &Swaps,
+    tests: usize,
+) -> Spread {
+    let has = |effect: Effect, robot: RobotId| entries.contains(&(effect, Whose::Robot(robot)));
     let mut jobs = Vec::new();
-    for &robot in &robots {
+    for robot in robots(units) {
         for (effects, build) in FAMILIES {
-            if effects.iter().any(|&effect| entries.contains(&(effect, Whose::Robot(robot)))) {
+            if effects.iter().any(|&effect| has(effect, robot)) {
                 jobs.push((robot, build));
             }
         }
     }
     let parts = parallel::map(&jobs, |&(robot, build)| {
-        let own: Vec<&Unit<'_>> = units.iter().copied().filter(|unit| unit.robot == robot).collect();
-        build(&own, fit).map_or_else(Spread::default, |family| of_family(&family, fit, robot, tests))
+        let family = build(&of_robot(units, robot), fit);
+        family.map_or_else(Spread::default, |family| of_family(&family, fit, robot, tests))
     });
-    let mut all = Spread::default();
+    let mut all = Spread { terms: swaps.terms(tests), ..Spread::default() };
     for part in parts {
         all.terms.extend(part.terms);
         all.undetected.extend(part.undetected);
         all.explained.extend(part.explained);
+    }
+    for robot in robots(units).into_iter().filter(|&robot| has(Effect::EncoderCoarse, robot)) {
+        all.terms.extend(ticks::coarse(&of_robot(units, robot), robot, tests));
     }
     all.untestable = untestable(units, entries);
     all
@@ -118,24 +156,46 @@ fn of_family(family: &Family<'_, '_>, fit: &Fit, robot: RobotId, tests: usize) -
     let base = family.base();
     let shows = family.select(&base, tests);
     let found: Vec<Effect> = shows.iter().map(|own| family.members[own.member].effect).collect();
-    let mut own = Spread { undetected: judge::undetected(family, &base, &found, robot, tests), ..Spread::default() };
+    let mut own =
+        Spread { undetected: judge::undetected(family, &base, &found, robot, tests), ..Spread::default() };
     for shows in &shows {
         let effect = family.members[shows.member].effect;
         // Effects of the mean that a family knows as rivals are the mean's to name.
-        if is_spread(effect) {
+        if EFFECTS.contains(&effect) {
             own.terms.push(judge::judged(family, shows, robot, tests));
         }
     }
+    own.explained = explained(family, &shows, &own.terms, fit);
     own.undetected.retain(|undetected| EFFECTS.iter().any(|effect| effect.name() == undetected.effect));
-    let _ = fit;
     own
+}
+
+/// What those that are findings explain of the mean.
+fn explained(family: &Family<'_, '_>, shows: &[Shows], terms: &[SpreadTerm], fit: &Fit) -> Vec<Explained> {
+    let mut all = Vec::new();
+    for shows in shows {
+        let effect = family.members[shows.member].effect;
+        let is_finding =
+            |own: &SpreadTerm| own.judged.estimated[0].term.effect == effect && own.judged.verdict.is_some();
+        if !terms.iter().any(is_finding) {
+            continue;
+        }
+        match effect {
+            Effect::GyroRandomWalk => all.extend(walk::explained(family, shows, fit)),
+            Effect::CommandJitter | Effect::CommandLoss => {
+                all.extend(executed::explained(family, shows, effect, fit));
+            }
+            _ => {}
+        }
+    }
+    all
 }
 
 fn untestable(units: &[&Unit<'_>], entries: &[Entry]) -> Vec<Untestable> {
     let mut all = Vec::new();
     for &(effect, whose) in entries {
         let Whose::Robot(robot) = whose else { continue };
-        let own: Vec<&Unit<'_>> = units.iter().copied().filter(|unit| unit.robot == robot).collect();
+        let own = of_robot(units, robot);
         let why = if effect == Effect::MissedDetections { missed::obstacle(&own) } else { None };
         if let Some(why) = why {
             all.push(Untestable { effect: effect.name().to_owned(), robot: Some(robot.0), why });

@@ -2,24 +2,36 @@
 
 use crate::diagnosis::corrected::sections;
 use crate::diagnosis::run::Judgement;
-use crate::diagnosis::spread::{Spread, SpreadTerm};
+use crate::diagnosis::spread::{Explained, Spread, SpreadTerm};
 use crate::findings::{Finding, HeldOut, Verdict};
 
 impl Spread {
-    /// Takes the verdict from terms of the mean that an effect of spread explains; says so.
+    /// Takes from terms of the mean what an effect of spread explains of them; says so.
     pub(crate) fn explain(&self, judgements: &mut [Judgement], notes: &mut Vec<String>) {
-        for &(position, by) in &self.explained {
+        for &Explained { position, by, part } in &self.explained {
             for own in judgements.iter_mut().filter(|own| own.group.contains(&position)) {
-                own.judged.verdict = None;
-                let name = own.judged.estimated[0].term.effect.name();
-                notes.push(format!("{name} is what {} leaves in the mean", by.name()));
+                let term = &mut own.judged.estimated[0].term;
+                let name = term.effect.name();
+                if let Some(part) = part {
+                    term.values[0] -= part;
+                    notes.push(format!("{name} is what remains beside {}: {part:.3e} less", by.name()));
+                } else {
+                    notes.push(format!("{name} is no finding: it is what {} does to the mean", by.name()));
+                    own.judged.verdict = None;
+                }
             }
         }
     }
 
+    /// Whether nothing is left of a term of the mean.
+    pub(crate) fn explains(&self, position: usize) -> bool {
+        self.explained.iter().any(|own| own.position == position && own.part.is_none())
+    }
+
     /// Those with a verdict, the largest gain first.
     pub(crate) fn found(&self) -> Vec<&SpreadTerm> {
-        let mut found: Vec<&SpreadTerm> = self.terms.iter().filter(|own| own.judged.verdict.is_some()).collect();
+        let mut found: Vec<&SpreadTerm> =
+            self.terms.iter().filter(|own| own.judged.verdict.is_some()).collect();
         found.sort_by(|a, b| b.gain.total.total_cmp(&a.gain.total));
         found
     }

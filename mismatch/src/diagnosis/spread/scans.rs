@@ -26,7 +26,7 @@ pub(super) struct Reading<'s> {
 impl Reading<'_> {
     /// Range and bearing minus those predicted for a target, and the range predicted.
     pub(super) fn errors(&self, model: &RobotModel<f64>, seen: &Seen) -> ([Option<f64>; 2], f64) {
-        let predicted = predict::sighting(model, &self.sighted.at.plain(), seen);
+        let predicted = predict::sighting(model, &self.sighted.at.bare(), seen);
         let range = self.measured[0].map(|range_m| range_m - predicted.range_m);
         let bearing = self.measured[1].map(|bearing_rad| (bearing_rad - predicted.bearing_rad).wrapped());
         ([range, bearing], predicted.range_m)
@@ -83,7 +83,8 @@ fn is_same(range: &Sighted, bearing: &Sighted) -> bool {
 pub(super) fn targets(unit: &Unit<'_>, kind: usize, time_s: f64) -> Vec<(Target, Seen)> {
     let evidence = unit.evidence;
     if kind == 0 {
-        let landmark = |(&id, place): (&LandmarkId, &[f64; 2])| (Target::Landmark(id), Seen::landmark(id.0, *place));
+        let landmark =
+            |(&id, place): (&LandmarkId, &[f64; 2])| (Target::Landmark(id), Seen::landmark(id.0, *place));
         return evidence.recording.landmarks.iter().map(landmark).collect();
     }
     let others = evidence.tracks.keys().filter(|robot| **robot != unit.robot);
@@ -96,7 +97,7 @@ pub(super) fn targets(unit: &Unit<'_>, kind: usize, time_s: f64) -> Vec<(Target,
 pub(super) fn actual(model: &RobotModel<f64>, reading: &Reading<'_>) -> Target {
     let named = reading.sighted.target;
     if sightings::renames(model) {
-        sightings::actual(model, &reading.sighted.at.plain(), named)
+        sightings::actual(model, &reading.sighted.at.bare(), named)
     } else {
         named
     }

@@ -83,10 +83,11 @@ impl Density for Sightings {
                 };
                 errors.iter().zip(&sigmas).map(part).sum()
             };
-            *value = of(&row.errors);
+            let named = of(&row.errors);
+            *value = named;
             if row.choices > 0 && mixed > 0.0 {
                 let others = row.others.iter().map(of).fold(f64::NEG_INFINITY, log_sum);
-                *value = log_sum(own + *value, other + others - libm::log(row.choices as f64));
+                *value = log_sum(own + named, other + others - libm::log(row.choices as f64));
             }
         }
     }

@@ -1,5 +1,5 @@
 //! A gyro's bias that wanders: `b(t + dt) = b(t) + N(0, q^2 dt)`, read with white noise of unknown size. The
-//! likelihood is that of a scalar Kalman filter's innovations (`schweppe1965`), its first bias a parameter.
+//! likelihood is that of a scalar Kalman filter's innovations (`schweppe1965`), which knows nothing of the first bias.
 //!
 //! A bias that warms up follows a curve instead, and is the rival: the mean's own terms of the gyro's bias are
 //! left out of the residuals here.
@@ -8,21 +8,27 @@ use pleiad_physics::Effect;
 
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
+use crate::diagnosis::naming::NEAR_END;
+use crate::diagnosis::spread::Explained;
 use crate::diagnosis::spread::density::bounded;
-use crate::diagnosis::spread::family::{Family, Member, Place, Shown, blocks};
-use crate::diagnosis::spread::maximum::{Bounds, Density};
+use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, Shows, blocks};
+use crate::diagnosis::spread::maximum::{Bounds, Density, maximize, uncertainty};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::Unit;
 
 /// Logarithm of the sigma of a window.
 const NOISE: usize = 0;
 /// The bias at the first window, rad/s.
-pub(super) const FIRST: usize = 1;
+const FIRST: usize = 1;
 /// The square of the density of the walk.
 const WALK: usize = 2;
 /// The bias gained by warming up, rad/s, and the logarithm of its time constant.
 const WARM: usize = 3;
 const TIME: usize = 4;
+/// The variance of the first bias about its parameter: so large that it says nothing, or zero.
+const UNKNOWN: usize = 5;
+/// A bias beyond this is none, rad/s.
+const LARGEST_BIAS: f64 = 0.1;
 
 struct Readings {
     /// Seconds since the unit's first, and the residual; a unit starts at `None`.
@@ -44,9 +50,10 @@ impl Density for Readings {
         let constant_s = libm::exp(parameters[TIME]);
         let (mut bias, mut variance) = (0.0, 0.0);
         for ((step_s, age_s, residual), value) in self.rows.iter().zip(into) {
-            match step_s {
-                Some(step_s) => variance += parameters[WALK] * step_s,
-                None => (bias, variance) = (parameters[FIRST], 0.0),
+            if let Some(step_s) = step_s {
+                variance += parameters[WALK] * step_s;
+            } else {
+                (bias, variance) = (parameters[FIRST], parameters[UNKNOWN]);
             }
             let warm = parameters[WARM] * -libm::expm1(-age_s / constant_s);
             let sigma = (variance + white).sqrt();
@@ -60,7 +67,7 @@ impl Density for Readings {
 }
 
 /// Whether a term of the mean says what the bias of a gyro does in time.
-pub(super) fn is_bias(term: &Term) -> bool {
+fn is_bias(term: &Term) -> bool {
     matches!(term.effect, Effect::GyroBias | Effect::GyroThermalDrift)
 }
 
@@ -97,6 +104,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
         Bounds { low: 0.0, high: most * most, scale: 1e-8 },
         Bounds { low: cold, high: hot, scale: sigma },
         Bounds { low: fast.ln(), high: slow.ln(), scale: 0.1 },
+        Bounds { low: 0.0, high: 1.0, scale: 1.0 },
     ];
     let walk = Member {
         effect: Effect::GyroRandomWalk,
@@ -121,8 +129,33 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
         units: units.to_vec(),
         places,
         bounds,
-        start: vec![sigma.ln(), 0.0, 0.0, 0.0, 60.0_f64.ln()],
-        nuisances: vec![NOISE, FIRST],
+        start: vec![sigma.ln(), 0.0, 0.0, 0.0, 60.0_f64.ln(), LARGEST_BIAS * LARGEST_BIAS],
+        nuisances: vec![NOISE],
         members: vec![walk, warming],
     })
+}
+
+/// Terms of the mean that a walk explains: a curve of warming up, and a bias that the walk could have reached.
+pub(super) fn explained(family: &Family<'_, '_>, walk: &Shows, fit: &Fit) -> Vec<Explained> {
+    // The first bias as a parameter, beside the walk.
+    let mut start = walk.with.parameters.clone();
+    start[UNKNOWN] = 0.0;
+    let free = [NOISE, FIRST, WALK];
+    let with = maximize(family.density.as_ref(), &family.bounds, &start, &free, &|_| true);
+    let known = uncertainty(family.density.as_ref(), &family.bounds, &with, &free);
+    let first = Contrast { weights: vec![(FIRST, 1.0)], threshold: 0.0 };
+    let threshold = |term: &Term| {
+        let floors = family.units.first().map(|unit| unit.floors).unwrap_or_default();
+        term.parameters()[0].relevance.threshold(&floors)
+    };
+    let starts_off = |term: &Term| {
+        let beyond = |(size, error): (f64, f64)| size - NEAR_END * error > threshold(term);
+        known.as_ref().and_then(|known| first.estimate(&with.parameters, known)).is_some_and(beyond)
+    };
+    let own = |term: &Term| is_bias(term) && family.units.iter().all(|unit| term.acts_on(unit.robot));
+    let terms = fit.terms.iter().enumerate().filter(|(_, term)| own(term));
+    terms
+        .filter(|(_, term)| term.effect == Effect::GyroThermalDrift || !starts_off(term))
+        .map(|(position, _)| Explained { position, by: Effect::GyroRandomWalk, part: None })
+        .collect()
 }

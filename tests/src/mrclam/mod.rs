@@ -1,7 +1,14 @@
 //! The diagnosis of real robots, fitted on one MRCLAM dataset and judged on another: what
 //! `docs/benchmarks/mrclam-diagnosis.md` reports and `tests/recordings_mrclam_diagnosis.rs` claims.
 
-#![allow(clippy::panic, clippy::expect_used, clippy::missing_panics_doc, reason = "helpers of tests fail by panicking")]
+#![allow(
+    clippy::panic,
+    clippy::expect_used,
+    clippy::missing_panics_doc,
+    reason = "helpers of tests fail by panicking"
+)]
+
+mod differences;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,6 +21,7 @@ use pleiad_physics::{ActiveEffect, Effect, RobotModel};
 use pleiad_recording::{ReadOptions, Recording};
 
 use crate::bootstrap::Pair;
+pub use differences::{CHANGES, Change, Difference, differences};
 
 /// What anyone would refit first: the scales of forward motion and of turns.
 pub const REFITTED: [Effect; 2] = [Effect::WheelRadiusError, Effect::TrackWidthError];
