@@ -1,10 +1,11 @@
 //! The wheels against the servo that follows the commands.
 
 use pleiad_estimation::RobotId;
-use pleiad_physics::chain::actuator::{ActuatorState, Command};
+use pleiad_physics::chain::actuator::ActuatorState;
 use pleiad_physics::predict::{CommandWindow, wheel_turns};
 use pleiad_physics::{Pose, RobotModel, Scalar};
 
+use crate::agitation::agitation;
 use crate::channel::Channel;
 use crate::evidence::Evidence;
 use crate::plan::Plan;
@@ -22,8 +23,6 @@ pub(crate) const SETTLING_S: f64 = 0.6;
 const MOST_TURN_RAD: f64 = 0.1;
 /// A window has no more parts.
 const MOST_PARTS: f64 = 8.0;
-/// A change of the set-point acts on a window that begins up to this much later, seconds.
-const CHANGE_REACH_S: f64 = 0.05;
 
 /// A window of the wheels.
 pub(crate) struct Turning {
@@ -35,7 +34,6 @@ pub(crate) struct Turning {
     regime: Regime,
     /// By how much the wheels turned, left and right, radians; `None` where the prediction is not known.
     pub(crate) measured: Option<[f64; 2]>,
-    du_squared: [f64; 2],
 }
 
 /// Commands are held to the next, through pauses of the encoders too. Where there is no truth, loads that
@@ -90,7 +88,6 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Turning> {
                 .collect(),
             regime,
             measured: known.then(|| [0, 1].map(|wheel| to.angle_rad[wheel] - from.angle_rad[wheel])),
-            du_squared: du_squared(track, (from.time_s - CHANGE_REACH_S, to.time_s)),
         });
         reached_s = to.time_s;
     }
@@ -107,20 +104,6 @@ fn parts(from_s: f64, to_s: f64, regime: &Regime) -> impl Iterator<Item = (f64, 
     (0..count).map(move |index| (edge(index), if index + 1 == count { to_s } else { edge(index + 1) }))
 }
 
-/// The sum of the squared changes of the set-point, of both wheels' mean and of right minus left, (rad/s)^2.
-fn du_squared(track: &Track, (from_s, to_s): (f64, f64)) -> [f64; 2] {
-    let [radius_m, axle_m] = track.geometry_m;
-    let commands = &track.commands;
-    let first = commands.partition_point(|command| command.time_s <= from_s).max(1);
-    let past = commands.partition_point(|command| command.time_s <= to_s).max(first);
-    let changes = (first..past).map(|index| (commands[index - 1], commands[index]));
-    changes.fold([0.0; 2], |[mean, difference], (before, after): (Command, Command)| {
-        let along = (after.speed_m_s - before.speed_m_s) / radius_m;
-        let turning = (after.yaw_rate_rad_s - before.yaw_rate_rad_s) * axle_m / radius_m;
-        [mean + along * along, difference + turning * turning]
-    })
-}
-
 /// Turning of the wheels, measured minus predicted: their mean, and right minus left. The servo is
 /// integrated exactly.
 pub(crate) fn residuals<S: Scalar>(
@@ -131,6 +114,7 @@ pub(crate) fn residuals<S: Scalar>(
     let mut channel = ChannelResiduals::planned(Channel::Actuator, plan);
     let mut schedule = Schedule::new(model, &track.commands);
     let mut state = ActuatorState::default();
+    let mut changes = agitation(track, plan, model).into_iter();
     for own in &plan.items {
         if let Some(before) = &own.before {
             wheel_turns(model, schedule.within(before), before, &mut state);
@@ -147,7 +131,7 @@ pub(crate) fn residuals<S: Scalar>(
         let middle_s = f64::midpoint(own.window.from_s, own.window.to_s);
         let values = [(left + right) * 0.5, right - left];
         let residual = Residual::new(middle_s, own.regime, None, &values, &[]);
-        channel.push(residual.with_du_squared(own.du_squared));
+        channel.push(residual.with_du_squared(changes.next().unwrap_or_default()));
     }
     channel
 }

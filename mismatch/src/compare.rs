@@ -4,6 +4,7 @@ use pleiad_estimation::RobotId;
 use pleiad_physics::{RobotModel, Scalar};
 use pleiad_recording::Recording;
 
+use crate::agitation::agitation;
 use crate::builtin;
 use crate::channel::Channel;
 use crate::error::MismatchError;
@@ -51,6 +52,15 @@ pub fn residuals_of<S: Scalar>(
         Channel::RangeToRobot => seen(Part::Range, to_robot),
         Channel::BearingToRobot => seen(Part::Bearing, of_robot),
     }
+}
+
+/// What [`Residual::du_squared`](crate::Residual::du_squared) is of the windows of the wheels under a model.
+pub(crate) fn agitation_of(
+    evidence: &Evidence<'_>,
+    robot: RobotId,
+    model: &RobotModel<f64>,
+) -> Vec<[f64; 2]> {
+    evidence.prepared(robot).map_or_else(Vec::new, |(track, plans)| agitation(track, &plans.actuator, model))
 }
 
 /// The true motion over 1 s against the whole chain driven by the commands, also of a robot whose encoders

@@ -9,6 +9,7 @@
 //! compared is said ([`Omission`]); nothing here panics on a recording, and no residual is NaN.
 
 mod actuator;
+mod agitation;
 mod body;
 mod builtin;
 mod channel;

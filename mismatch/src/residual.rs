@@ -82,9 +82,9 @@ impl<S: Scalar> Residual<S> {
         &self.sigmas[..self.components]
     }
 
-    /// For the channel [`Channel::Actuator`], per component, the sum of the squared changes of the set-point
-    /// in the window and the 50 ms before it, (rad/s)^2: a command that comes at a random time adds the
-    /// variance of that time multiplied by this. Zero in the other channels.
+    /// For the channel [`Channel::Actuator`], per component, the sum of the squared changes of speed that
+    /// single commands make in the window, (rad/s)^2: a command that comes at a random time adds the variance
+    /// of that time multiplied by this. Zero in the other channels.
     pub fn du_squared(&self) -> &[f64] {
         &self.du_squared[..self.components]
     }

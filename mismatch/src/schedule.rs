@@ -17,6 +17,11 @@ impl<S: Scalar> Schedule<S> {
         Self { scheduled: schedule(model, commands, |_| Chance::EXPECTED), begun: 0 }
     }
 
+    /// All of them.
+    pub(crate) fn all(&self) -> &[Scheduled<S>] {
+        &self.scheduled
+    }
+
     /// The commands that act in a window. Ask for windows in the order of time.
     pub(crate) fn within(&mut self, window: &CommandWindow) -> &[Scheduled<S>] {
         let rest = &self.scheduled[self.begun..];

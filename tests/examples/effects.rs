@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::process::ExitCode;
 
 use pleiad_physics::Effect;
-use pleiad_tests::known_effects::{Case, SEEDS, case, cases, rows, run, table};
+use pleiad_tests::known_effects::{Case, SEEDS, cases, cases_of, rows, run, table};
 
 /// What the table stands between.
 const MARKS: [&str; 2] = ["<!-- table -->", "<!-- end -->"];
@@ -46,7 +46,7 @@ fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
             name => {
                 let effect = Effect::from_name(name)
                     .ok_or_else(|| format!("no effect `{name}`; see pleiad effects"))?;
-                chosen.push(case(effect));
+                chosen.extend(cases_of(effect));
             }
         }
     }

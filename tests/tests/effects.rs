@@ -3,14 +3,7 @@
 
 #![cfg(feature = "slow")]
 
-use pleiad_physics::Effect;
-use pleiad_tests::known_effects::{SEEDS, apart, cases, run};
-
-#[test]
-fn every_effect_is_in_the_benchmark_or_apart_with_a_reason() {
-    assert_eq!(cases().len() + apart().len(), Effect::ALL.len());
-    assert!(apart().iter().all(|own| !own.why.is_empty()));
-}
+use pleiad_tests::known_effects::{SEEDS, cases, run};
 
 #[test]
 fn standard_errors_are_small_and_right() {

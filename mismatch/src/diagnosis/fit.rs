@@ -69,7 +69,7 @@ impl Fit {
 pub(crate) fn states(units: &[&Unit<'_>], terms: &[Term]) -> Option<Vec<State>> {
     let state = |unit: &&Unit<'_>| {
         let residuals = residuals(unit, terms, &|_| true, None)?;
-        Some(State { noise: noise::estimate(unit, &residuals), residuals })
+        Some(State { noise: noise::estimate(unit, terms, &residuals), residuals })
     };
     units.iter().map(state).collect()
 }
@@ -79,7 +79,7 @@ pub(crate) fn with_another(units: &[&Unit<'_>], known: &[State], terms: &[Term])
     let added = terms.last()?.effect;
     let state = |(unit, state): (&&Unit<'_>, &State)| {
         let residuals = residuals(unit, terms, &|channel| touches(added, channel), Some(&state.residuals))?;
-        Some(State { noise: noise::estimate(unit, &residuals), residuals })
+        Some(State { noise: noise::estimate(unit, terms, &residuals), residuals })
     };
     units.iter().zip(known).map(state).collect()
 }
@@ -143,7 +143,7 @@ pub(crate) fn fit_from(
         let Some(step) = improve(units, &states, &terms, &slots, &normal, &mut damping) else { break };
         terms = step.terms;
         for ((state, residuals), unit) in states.iter_mut().zip(step.residuals).zip(units) {
-            state.noise = noise::estimate(unit, &residuals);
+            state.noise = noise::estimate(unit, &terms, &residuals);
             state.residuals = residuals;
         }
         if step.gain > RELINEARIZE {

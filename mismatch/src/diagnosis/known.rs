@@ -4,6 +4,7 @@
 //! (`docs/benchmarks/effects.md`). The search is the diagnosis's own: its starts, its scores, its refinement
 //! of places and onsets, its fit.
 
+use nalgebra::DMatrix;
 use pleiad_estimation::RobotId;
 use pleiad_physics::{Effect, Fit as How};
 use pleiad_recording::Recording;
@@ -12,11 +13,12 @@ use crate::builtin;
 use crate::diagnosis::candidate::candidates;
 use crate::diagnosis::entries::is_shared;
 use crate::diagnosis::fit::{Effort, Fit, fit};
-use crate::diagnosis::naming::Estimated;
+use crate::diagnosis::naming::{Estimated, Z_95};
 use crate::diagnosis::profile::{Profile, polish};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::run::{Prepared, unit};
 use crate::diagnosis::select::{Scored, covariance, fit_beside, score, whites};
+use crate::diagnosis::spread::{is_of_spread, known, known_swap};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::error::MismatchError;
@@ -94,11 +96,14 @@ pub fn fit_known(
     let prepared = Prepared { recording, evidence, models, tested: false };
     let shared = effects.iter().any(|effect| is_shared(effect.info()));
     let concerned = prepared.models.iter().filter(|(own, _)| shared || **own == robot);
-    let all: Vec<Unit<'_>> = concerned.map(|(&own, model)| unit(0, &prepared, own, model)).collect();
+    let mut all: Vec<Unit<'_>> = concerned.map(|(&own, model)| unit(0, &prepared, own, model)).collect();
+    // Sightings under wrong names are put right before anything is fitted.
+    let swapped = effects.contains(&Effect::LandmarkIdentitySwap).then(|| known_swap(&mut all)).flatten();
     let units: Vec<&Unit<'_>> = all.iter().filter(|unit| !unit.rows.is_empty()).collect();
 
     let Some(mut current) = fit(&units, Vec::new(), &|_| true, Effort::FULL) else { return Ok(Vec::new()) };
-    for &effect in effects {
+    let of_mean = effects.iter().copied().filter(|&effect| !is_of_spread(effect));
+    for effect in of_mean {
         let whose = if is_shared(effect.info()) { Whose::Everyone } else { Whose::Robot(robot) };
         if let Some(term) = found(&units, &current, effect, whose) {
             let mut terms = current.terms.clone();
@@ -107,7 +112,15 @@ pub fn fit_known(
         }
     }
     let current = polish(&units, current);
-    Ok(known(&units, &current))
+    let of_mean = of_mean_known(&units, &current);
+    let of_spread = effects.iter().filter(|&&effect| is_of_spread(effect)).filter_map(|&effect| {
+        if effect == Effect::LandmarkIdentitySwap {
+            return swapped.clone();
+        }
+        known(&units, &current, effect, robot)
+    });
+    let of_spread = of_spread.map(|estimated| known_fit(&units, &estimated, &|_| None));
+    Ok(of_mean.into_iter().chain(of_spread).collect())
 }
 
 /// An effect where the likelihood is greatest beside a fit, of all its starts.
@@ -129,44 +142,53 @@ fn found(units: &[&Unit<'_>], current: &Fit, effect: Effect, whose: Whose) -> Op
     best.map(|(_, term)| term)
 }
 
-/// Values and intervals of every term.
-fn known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
+/// Values and intervals of every term of a fit.
+fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
     // Thresholds alone leave nothing that has a derivative.
     let found = if fit.slots.is_empty() { None } else { covariance(units, fit) };
     let covariance =
-        found.unwrap_or_else(|| nalgebra::DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
+        found.unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
     let profile = Profile::new(units, fit);
     let one = |position: usize| {
         let estimated = Estimated::of(fit, &covariance, position);
-        let term = &estimated.term;
-        let parameter = |index: usize| {
-            let parameter = &term.parameters()[index];
-            let mut own = KnownParameter {
-                label: parameter.label(),
-                unit: parameter.unit,
-                value: term.values[index],
-                standard_error: None,
-                ci95: None,
-                interval: Interval::None,
-            };
-            if let Some(error) = estimated.errors[index] {
-                own.standard_error = Some(error);
-                own.ci95 = estimated.interval(index);
-                own.interval = Interval::Sandwich;
-            } else if parameter.fit != How::Choice
-                && let Some(ci95) = profile.interval((position, index))
-            {
-                own.standard_error = Some((ci95[1] - ci95[0]) / (2.0 * crate::diagnosis::naming::Z_95));
-                own.ci95 = Some(ci95);
-                own.interval = Interval::Profile;
-            }
-            own
-        };
-        KnownFit {
-            effect: term.effect,
-            robots: units.iter().map(|unit| unit.robot).filter(|&robot| term.acts_on(robot)).collect(),
-            parameters: (0..term.values.len()).map(parameter).collect(),
-        }
+        known_fit(units, &estimated, &|index| profile.interval((position, index)))
     };
     (0..fit.terms.len()).map(one).collect()
+}
+
+/// Values and intervals of a term; those that its derivatives do not give come from `profile`.
+fn known_fit(
+    units: &[&Unit<'_>],
+    estimated: &Estimated,
+    profile: &dyn Fn(usize) -> Option<[f64; 2]>,
+) -> KnownFit {
+    let term = &estimated.term;
+    let parameter = |index: usize| {
+        let parameter = &term.parameters()[index];
+        let mut own = KnownParameter {
+            label: parameter.label(),
+            unit: parameter.unit,
+            value: term.values[index],
+            standard_error: None,
+            ci95: None,
+            interval: Interval::None,
+        };
+        if let Some(error) = estimated.errors[index] {
+            own.standard_error = Some(error);
+            own.ci95 = estimated.interval(index);
+            own.interval = Interval::Sandwich;
+        } else if parameter.fit != How::Choice
+            && let Some(ci95) = profile(index)
+        {
+            own.standard_error = Some((ci95[1] - ci95[0]) / (2.0 * Z_95));
+            own.ci95 = Some(ci95);
+            own.interval = Interval::Profile;
+        }
+        own
+    };
+    KnownFit {
+        effect: term.effect,
+        robots: units.iter().map(|unit| unit.robot).filter(|&robot| term.acts_on(robot)).collect(),
+        parameters: (0..term.values.len()).map(parameter).collect(),
+    }
 }

@@ -4,7 +4,8 @@
 //! it is for a normal distribution. For normal residuals it is their standard deviation; up to a tenth of wild
 //! ones moves it little. With the scales profiled out, a model's log-likelihood is `-sum n log s`.
 
-use crate::diagnosis::unit::{Row, Unit};
+use crate::diagnosis::term::Term;
+use crate::diagnosis::unit::Unit;
 
 /// A residual counts as this many sigmas at most.
 pub(crate) const CLIP: f64 = 5.0;
@@ -42,12 +43,18 @@ pub(crate) fn rho(z: f64) -> f64 {
 }
 
 /// Estimates the noise from residuals.
-pub(crate) fn estimate(unit: &Unit<'_>, residuals: &[f64]) -> Noise {
-    estimate_from(unit, residuals, &|_| true)
+pub(crate) fn estimate(unit: &Unit<'_>, terms: &[Term], residuals: &[f64]) -> Noise {
+    estimate_from(unit, terms, residuals, &|_| true)
 }
 
 /// Estimates the noise of all elements from those for which `kept` holds.
-pub(crate) fn estimate_from(unit: &Unit<'_>, residuals: &[f64], kept: &dyn Fn(usize) -> bool) -> Noise {
+pub(crate) fn estimate_from(
+    unit: &Unit<'_>,
+    terms: &[Term],
+    residuals: &[f64],
+    kept: &dyn Fn(usize) -> bool,
+) -> Noise {
+    let agitation = unit.agitation(terms);
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); unit.scales.len()];
     for (index, &scale) in unit.scale_of.iter().enumerate().filter(|(index, _)| kept(*index)) {
         members[scale].push(index);
@@ -55,7 +62,7 @@ pub(crate) fn estimate_from(unit: &Unit<'_>, residuals: &[f64], kept: &dyn Fn(us
     let mut noise =
         Noise { sigma: Vec::new(), scales: Vec::new(), log_likelihood: 0.0, per_scale: Vec::new() };
     for own in &members {
-        let agitated: Vec<f64> = own.iter().map(|&index| unit.rows[index].agitation).collect();
+        let agitated: Vec<f64> = own.iter().map(|&index| agitation[index]).collect();
         let values: Vec<f64> = own.iter().map(|&index| residuals[index]).collect();
         let mut spreads = vec![1.0; own.len()];
         let mut scale = m_scale(&mut values.clone());
@@ -74,8 +81,8 @@ pub(crate) fn estimate_from(unit: &Unit<'_>, residuals: &[f64], kept: &dyn Fn(us
         noise.per_scale.push(-cost);
         noise.log_likelihood -= cost;
     }
-    let sigma = |(row, &scale): (&Row, &usize)| noise.scales[scale].hypot(row.agitation.sqrt());
-    noise.sigma = unit.rows.iter().zip(&unit.scale_of).map(sigma).collect();
+    let sigma = |(agitation, &scale): (&f64, &usize)| noise.scales[scale].hypot(agitation.sqrt());
+    noise.sigma = agitation.iter().zip(&unit.scale_of).map(sigma).collect();
     noise
 }
 

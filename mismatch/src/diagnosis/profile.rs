@@ -16,11 +16,20 @@ use crate::diagnosis::white::{White, step};
 /// The 95 % quantile of chi-square with one degree of freedom: what twice the log-likelihood may lose.
 const CHI_SQUARE_95: f64 = 3.841_458_820_694_124;
 /// Onsets are searched from this to this, seconds.
-const ONSET_STEPS_S: (f64, f64) = (0.5, 0.01);
+const ONSET_STEPS_S: (f64, f64) = (0.05, 0.005);
 /// Borders are searched from this to this, metres.
 const BORDER_STEPS_M: (f64, f64) = (0.1, 0.005);
 /// Thresholds are searched from this to this share of themselves.
 const THRESHOLD_STEPS: (f64, f64) = (0.08, 0.002);
+/// An onset is first looked for at these distances on either side, seconds: a step, and how many of them.
+const ONSET_GRID: (f64, i32) = (0.1, 15);
+/// A change of twice the log-likelihood that is none.
+const SAME: f64 = 1e-3;
+/// At a value, parameters with a derivative are fitted in so many steps at most, until one gains less than this.
+const MOST_STEPS: i32 = 4;
+const SMALL_GAIN: f64 = 2.0;
+/// A robot that stays so far from a place, metres, knows nothing of its borders.
+const NEAR_M: f64 = 1.0;
 /// Ends of an interval are halved so often.
 const HALVINGS: usize = 5;
 /// An end that is farther than so many doublings of the least step is not there.
@@ -46,23 +55,66 @@ impl<'u, 'a> Profile<'u, 'a> {
 
     /// Log-likelihood at a value of a parameter, but for a constant. `None` if the model predicts no finite
     /// numbers there.
-    fn at(&self, (term, parameter): Slot, value: f64) -> Option<f64> {
+    fn at(&self, slot: Slot, value: f64) -> Option<f64> {
         let mut terms = self.fit.terms.clone();
-        terms[term].values[parameter] = value;
-        let effect = terms[term].effect;
-        let slots: Vec<Slot> = self.fit.slots.iter().copied().filter(|slot| slot.0 == term).collect();
-        let mut states: Vec<State> = Vec::with_capacity(self.units.len());
-        let mut own = Vec::with_capacity(self.units.len());
-        for (unit, state) in self.units.iter().zip(&self.fit.states) {
-            let residuals =
-                residuals(unit, &terms, &|channel| touches(effect, channel), Some(&state.residuals))?;
-            states.push(State { residuals, noise: state.noise.clone() });
-            own.push(columns(unit, &terms, &slots));
+        terms[slot.0].values[slot.1] = value;
+        let effect = terms[slot.0].effect;
+        let slots: Vec<Slot> = self.fit.slots.iter().copied().filter(|own| own.0 == slot.0).collect();
+        let concerned: Vec<usize> = (0..self.units.len()).filter(|&unit| self.concerns(slot, unit)).collect();
+        let units: Vec<&Unit<'_>> = concerned.iter().map(|&unit| self.units[unit]).collect();
+        for step in 1.. {
+            let mut states: Vec<State> = Vec::with_capacity(units.len());
+            let mut own = Vec::with_capacity(units.len());
+            for (&unit, &position) in units.iter().zip(&concerned) {
+                let known = &self.fit.states[position];
+                let residuals =
+                    residuals(unit, &terms, &|channel| touches(effect, channel), Some(&known.residuals))?;
+                states.push(State { residuals, noise: known.noise.clone() });
+                own.push(columns(unit, &terms, &slots));
+            }
+            let cost: f64 = states.iter().map(cost).sum();
+            if slots.is_empty() {
+                return Some(-cost);
+            }
+            let normal = Normal::new(&units, &states, &own, slots.len());
+            let change = normal.step(1e-9)?;
+            let gained = 0.5 * change.dot(&normal.gradient);
+            if gained < SMALL_GAIN || step == MOST_STEPS {
+                return Some(gained - cost);
+            }
+            for (&(term, parameter), change) in slots.iter().zip(change.iter()) {
+                terms[term].values[parameter] += change;
+            }
+            terms[slot.0].clamp();
         }
-        let cost: f64 = states.iter().map(cost).sum();
-        let normal = Normal::new(self.units, &states, &own, slots.len());
-        let gained = if slots.is_empty() { 0.0 } else { 0.5 * normal.step(1e-9)?.dot(&normal.gradient) };
-        Some(gained - cost)
+        None
+    }
+
+    /// Whether a parameter can matter to a unit: a place only to a robot that came near it.
+    fn concerns(&self, slot: Slot, unit: usize) -> bool {
+        let term = &self.fit.terms[slot.0];
+        if !term.acts_on(self.units[unit].robot) {
+            return false;
+        }
+        let Some(first) = Placing::of(term.effect.info()).region else { return true };
+        let [x_min, x_max, y_min, y_max] = [0, 1, 2, 3].map(|bound| term.values[first + bound]);
+        let (low, high) = ([x_min, y_min], [x_max, y_max]);
+        self.units[unit].rows.iter().filter_map(|row| row.regime.pose).any(|pose| {
+            let place = pose.position();
+            (0..2).all(|axis| place[axis] > low[axis] - NEAR_M && place[axis] < high[axis] + NEAR_M)
+        })
+    }
+
+    /// The middle of all values whose likelihood is that of this one: where predictions do not change, none
+    /// of them is better.
+    fn plateau(&self, slot: Slot, value: f64) -> f64 {
+        let (_, least) = steps(&self.fit.terms[slot.0], slot.1);
+        let ends = self.at(slot, value).and_then(|most| {
+            let low = self.end(slot, value, -least, most, SAME)?;
+            let high = self.end(slot, value, least, most, SAME)?;
+            Some((low, high))
+        });
+        ends.map_or(value, |(low, high)| f64::midpoint(low, high))
     }
 
     /// The 95 % interval of a parameter; `None` if the likelihood does not bound it.
@@ -75,15 +127,15 @@ impl<'u, 'a> Profile<'u, 'a> {
         }
         let (_, least) = steps(term, slot.1);
         let most = self.at(slot, value)?;
-        let low = self.end(slot, value, -least, most)?;
-        let high = self.end(slot, value, least, most)?;
+        let low = self.end(slot, value, -least, most, CHI_SQUARE_95)?;
+        let high = self.end(slot, value, least, most, CHI_SQUARE_95)?;
         Some([low, high])
     }
 
-    /// The end of the interval on one side.
-    fn end(&self, slot: Slot, value: f64, least: f64, most: f64) -> Option<f64> {
+    /// Where twice the log-likelihood has lost so much on one side.
+    fn end(&self, slot: Slot, value: f64, least: f64, most: f64, loss: f64) -> Option<f64> {
         let inside = |there: f64| {
-            self.at(slot, there).is_some_and(|found| 2.0 * (most - found) / self.inflation < CHI_SQUARE_95)
+            self.at(slot, there).is_some_and(|found| 2.0 * (most - found) / self.inflation < loss)
         };
         let (mut near, mut far) = (0.0, least);
         let mut doublings = 0;
@@ -161,14 +213,16 @@ pub(crate) fn polish_some(
         return current;
     }
     for _ in 0..2 {
+        let mut terms = current.terms.clone();
         for &slot in &loose {
-            let value = best(&Profile::new(units, &current), slot);
-            let mut terms = current.terms.clone();
+            let profile = Profile::new(units, &current);
+            let value = profile.plateau(slot, best(&profile, slot));
             terms[slot.0].values[slot.1] = value;
-            match fit(units, terms, movable, effort) {
-                Some(next) => current = next,
-                None => return current,
-            }
+            current.terms[slot.0].values[slot.1] = value;
+        }
+        match fit(units, terms, movable, effort) {
+            Some(next) => current = next,
+            None => return current,
         }
     }
     current
@@ -187,6 +241,15 @@ fn best(profile: &Profile<'_, '_>, slot: Slot) -> f64 {
     let at = |value: f64| profile.at(slot, value).unwrap_or(f64::NEG_INFINITY);
     let mut value = term.values[slot.1];
     let mut most = at(value);
+    if Placing::of(term.effect.info()).onset == Some(slot.1) {
+        let (step_s, steps) = ONSET_GRID;
+        for other in (-steps..=steps).map(|step| term.values[slot.1] + step_s * f64::from(step)) {
+            let there = at(other);
+            if there > most {
+                (value, most) = (other, there);
+            }
+        }
+    }
     if is_threshold(term, slot.1) {
         for other in thresholds(parameter, profile.units) {
             let there = at(other);

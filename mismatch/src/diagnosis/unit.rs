@@ -1,5 +1,6 @@
 //! One robot in one recording: its residuals under a model, as one long vector.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use pleiad_estimation::RobotId;
@@ -7,8 +8,9 @@ use pleiad_estimation::sample::Target;
 use pleiad_physics::{Dual, Floors, RobotModel, Scalar, Variable};
 
 use crate::channel::Channel;
-use crate::compare::residuals_of;
+use crate::compare::{agitation_of, residuals_of};
 use crate::diagnosis::term::Term;
+use crate::diagnosis::touch::touches;
 use crate::evidence::Evidence;
 use crate::residual::{Omission, Regime};
 
@@ -40,9 +42,6 @@ pub(crate) struct Row {
     pub(crate) time_s: f64,
     pub(crate) regime: Regime,
     pub(crate) target: Option<Target>,
-    /// Variance that the declared jitter of commands adds; zero for other channels. Declared and not fitted,
-    /// because a fitted one would swallow every lag: it shows in the same rows.
-    pub(crate) agitation: f64,
 }
 
 /// The most that commands ask for.
@@ -96,6 +95,10 @@ pub(crate) struct Unit<'a> {
     pub(crate) span_s: (f64, f64),
     /// The most that commands ask for.
     pub(crate) demand: Demand,
+    /// One sigma of the time at which a command comes, seconds, as it is declared.
+    jitter_sigma_s: f64,
+    /// One per element, under the nominal model: see [`Unit::agitation`].
+    agitation: Vec<f64>,
 }
 
 /// Residuals of the channels asked for; the others are `None`.
@@ -142,6 +145,8 @@ impl<'a> Unit<'a> {
             blocks: 0,
             span_s: (0.0, 0.0),
             demand,
+            jitter_sigma_s,
+            agitation: Vec::new(),
         };
         for channel in Channel::ALL {
             let found = residuals_of(evidence, robot, &unit.nominal, channel);
@@ -164,9 +169,9 @@ impl<'a> Unit<'a> {
                         time_s: row.time_s,
                         regime: row.regime,
                         target: row.target,
-                        agitation: row.du_squared()[component] * jitter_sigma_s * jitter_sigma_s,
                     });
                     unit.scale_of.push(first_scale + component);
+                    unit.agitation.push(row.du_squared()[component] * jitter_sigma_s * jitter_sigma_s);
                 }
             }
         }
@@ -194,6 +199,23 @@ impl<'a> Unit<'a> {
             }
         }
         model
+    }
+
+    /// Variance per element that the declared jitter of commands adds; zero for channels but the actuator's.
+    /// Declared and not fitted, because a fitted one would swallow every lag: it shows in the same rows.
+    pub(crate) fn agitation(&self, terms: &[Term]) -> Cow<'_, [f64]> {
+        let moves = |term: &Term| term.acts_on(self.robot) && touches(term.effect, Channel::Actuator);
+        let stretch = self.stretch(Channel::Actuator);
+        let (Some(stretch), true) = (stretch, self.jitter_sigma_s > 0.0 && terms.iter().any(moves)) else {
+            return Cow::Borrowed(&self.agitation);
+        };
+        let mut all = self.agitation.clone();
+        let changes = agitation_of(self.evidence, self.robot, &self.model(terms));
+        let variance = self.jitter_sigma_s * self.jitter_sigma_s;
+        for (element, change) in all[stretch.range()].iter_mut().zip(changes.into_iter().flatten()) {
+            *element = change * variance;
+        }
+        Cow::Owned(all)
     }
 
     /// Residuals under a model; `None` for a channel in which a prediction is no finite number where the

@@ -129,14 +129,8 @@ fn hold<S: Scalar>(
     model.apply(&context, |effect, values| effect.wheel_set_point(values, &context, &mut wheels));
     let (speed, yaw_rate) = kinematics.body(wheels.speed_rad_s);
 
+    let servo = servo(model, &context);
     let unlimited = S::constant(f64::INFINITY);
-    let mut servo = Servo {
-        time_constant_s: model.nominal.servo_time_constant_s,
-        time_constant_turn_s: model.nominal.servo_time_constant_turn_s,
-        acceleration_limit_m_s2: unlimited,
-        droop_m_s: S::zero(),
-    };
-    model.apply(&context, |effect, values| effect.servo(values, &context, &mut servo));
     let along = follow(
         state.speed_m_s,
         speed + servo.droop_m_s,
@@ -154,6 +148,18 @@ fn hold<S: Scalar>(
     model.apply(&context, |effect, values| effect.transmission(values, &context, &mut transmission));
     state.play_rad = transmission.play_rad;
     transmission.turned_rad
+}
+
+/// How the servo follows its set-point.
+pub fn servo<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> Servo<S> {
+    let mut servo = Servo {
+        time_constant_s: model.nominal.servo_time_constant_s,
+        time_constant_turn_s: model.nominal.servo_time_constant_turn_s,
+        acceleration_limit_m_s2: S::constant(f64::INFINITY),
+        droop_m_s: S::zero(),
+    };
+    model.apply(context, |effect, values| effect.servo(values, context, &mut servo));
+    servo
 }
 
 /// The kinematics that the firmware believes: always those of the nominal robot.

@@ -5,6 +5,7 @@ use pleiad_estimation::RobotId;
 use pleiad_mismatch::acts_on_every_robot;
 use pleiad_physics::{ActiveEffect, Channel, Effect, Fit};
 use pleiad_sim_peers::Scenario;
+use pleiad_sim_peers::scenario::{DriveKind, Policy};
 
 /// The robot that an effect of its own acts on: the one in the middle, which sees both others.
 pub const ROBOT: RobotId = RobotId(2);
@@ -14,6 +15,10 @@ const ONSET_SHARE: f64 = 0.4;
 const MEETING_AREA_M: [f64; 4] = [-2.0, 2.0, -2.0, 2.0];
 /// The recording.
 const SCENARIO: &str = include_str!("../../../scenarios/manoeuvres.toml");
+
+/// The slow triangle of speeds that dead band and stiction ask for: steps of the speed, m/s, how many, and how
+/// long each, seconds.
+const TRIANGLE: (f64, u32, f64) = (0.012, 8, 0.4);
 
 /// An effect and the scenario in which it acts.
 #[derive(Clone, Debug)]
@@ -26,51 +31,16 @@ pub struct Case {
     pub scenario: Scenario,
 }
 
-/// An effect that is not in the benchmark.
-#[derive(Clone, Debug)]
-pub struct Apart {
-    /// Which effect.
-    pub effect: Effect,
-    /// Why.
-    pub why: &'static str,
-}
-
-/// Every effect that can be estimated, in the order of the catalogue.
+/// Every effect, in the order of the catalogue.
 pub fn cases() -> Vec<Case> {
-    Effect::ALL.iter().filter(|&&effect| why_apart(effect).is_none()).map(|&effect| case(effect)).collect()
+    Effect::ALL.iter().flat_map(|&effect| cases_of(effect)).collect()
 }
 
-/// Every effect that cannot, and why.
-pub fn apart() -> Vec<Apart> {
-    Effect::ALL.iter().filter_map(|&effect| why_apart(effect).map(|why| Apart { effect, why })).collect()
-}
-
-fn why_apart(effect: Effect) -> Option<&'static str> {
-    let info = effect.info();
-    if info.channels.contains(&Channel::Steer) {
-        return Some("the steering angle is not a channel of recordings");
-    }
-    match effect {
-        Effect::RangeDependentNoise
-        | Effect::MotionBlur
-        | Effect::GyroRandomWalk
-        | Effect::HeavyTails
-        | Effect::IdentityMixUp
-        | Effect::MissedDetections
-        | Effect::CommandLoss
-        | Effect::CommandJitter
-        | Effect::EncoderCoarse => Some("it acts on the spread of residuals, which has no estimator yet"),
-        Effect::LandmarkIdentitySwap => Some("it is a choice between labels, without a size"),
-        _ => None,
-    }
-}
-
-/// An effect at its typical size.
-pub fn case(effect: Effect) -> Case {
-    let mut scenario = Scenario::from_toml(SCENARIO, "manoeuvres.toml").expect("a shipped scenario");
-    let info = effect.info();
+/// The cases of an effect at its typical size: one, but for a dead band, which is of the speed or of a wheel.
+pub fn cases_of(effect: Effect) -> Vec<Case> {
+    let scenario = Scenario::from_toml(SCENARIO, "manoeuvres.toml").expect("a shipped scenario");
     let mut values = effect.typical_values();
-    for (value, parameter) in values.iter_mut().zip(info.parameters) {
+    for (value, parameter) in values.iter_mut().zip(effect.info().parameters) {
         match parameter.name {
             "t_on_s" => *value = ONSET_SHARE * scenario.duration_s,
             // The supply voltage is no channel of recordings.
@@ -78,7 +48,18 @@ pub fn case(effect: Effect) -> Case {
             _ => {}
         }
     }
+    if effect == Effect::MotorDeadband {
+        return vec![
+            case(scenario.clone(), effect, vec![values[0], 0.0]),
+            case(scenario, effect, vec![0.0, values[1]]),
+        ];
+    }
+    vec![case(scenario, effect, values)]
+}
+
+fn case(mut scenario: Scenario, effect: Effect, values: Vec<f64>) -> Case {
     let active = ActiveEffect::new(effect, &values).expect("a typical size for every parameter");
+    let needs = |channel: Channel| effect.info().channels.contains(&channel);
     for (robot, settings) in &mut scenario.robots {
         if *robot == ROBOT || acts_on_every_robot(effect) {
             settings.effects.push(active);
@@ -86,8 +67,30 @@ pub fn case(effect: Effect) -> Case {
         if effect == Effect::PartnerInfluence {
             settings.motion.area_m = Some(MEETING_AREA_M);
         }
+        if needs(Channel::Steer) {
+            settings.drive.kind = DriveKind::CarLike;
+        }
+        if *robot == ROBOT && matches!(effect, Effect::MotorDeadband | Effect::Stiction) {
+            settings.motion.policy = Policy::Script;
+            settings.motion.script = triangles(scenario.duration_s);
+        }
     }
     Case { effect, values, scenario }
+}
+
+/// Slow triangles of the speed, forth and back, for so long.
+fn triangles(duration_s: f64) -> Vec<[f64; 3]> {
+    let (step_m_s, steps, each_s) = TRIANGLE;
+    let shares = (1..=steps).chain((1..steps).rev()).map(f64::from);
+    let mut once = Vec::new();
+    for sense in [1.0, -1.0] {
+        once.extend(shares.clone().map(|share| [sense * share * step_m_s, 0.0, each_s]));
+        once.push([0.0, 0.0, each_s]);
+    }
+    let lasts_s: f64 = once.iter().map(|row| row[2]).sum();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
+    let times = (duration_s / lasts_s).ceil() as usize;
+    once.repeat(times)
 }
 
 /// Whether a parameter has a size: labels have none.

@@ -13,7 +13,7 @@ use std::thread;
 use pleiad_mismatch::{KnownFit, fit_known};
 use pleiad_sim_peers::simulate;
 
-pub use cases::{Apart, Case, ROBOT, apart, case, cases};
+pub use cases::{Case, ROBOT, cases, cases_of};
 pub use outcome::{Outcome, Row};
 pub use table::{rows, table};
 

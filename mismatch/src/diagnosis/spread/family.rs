@@ -168,7 +168,7 @@ impl Family<'_, '_> {
 
     /// The likelihood with these members active; the search begins at `from`, with new ones at their start.
     #[allow(clippy::float_cmp, reason = "the off value itself")]
-    fn fit(&self, active: &[usize], from: &Optimum, kept: &dyn Fn(usize) -> bool) -> Optimum {
+    pub(super) fn fit(&self, active: &[usize], from: &Optimum, kept: &dyn Fn(usize) -> bool) -> Optimum {
         let mut start = from.parameters.clone();
         for (index, member) in self.members.iter().enumerate() {
             for ((&parameter, &off), &begin) in member.parameters.iter().zip(&member.off).zip(&member.start) {

@@ -17,14 +17,7 @@ use crate::findings::{Place, Undetected, Verdict};
 /// Judges what a family of one robot shows, among so many tests.
 pub(super) fn judged(family: &Family<'_, '_>, shows: &Shows, robot: RobotId, tests: usize) -> SpreadTerm {
     let member = &family.members[shows.member];
-    let parameters = &shows.with.parameters;
-    let values = member.shown.iter().map(|shown| shown.value(parameters)).collect();
-    let errors = member.shown.iter().map(|shown| shown.error(parameters, &shows.known)).collect();
-    let mut term = Term::new(member.effect, Whose::Robot(robot), values);
-    for (free, shown) in term.free.iter_mut().zip(&member.shown) {
-        *free = !matches!(shown, Shown::Fixed(_));
-    }
-    let estimated = Estimated { term, errors, profiled: Vec::new() };
+    let estimated = estimated(member, robot, &shows.with, &shows.known);
     let relevant = is_relevant(family, member, &estimated, &shows.with, &shows.known);
     let mut support = vec![member.effect];
     support.extend(&shows.rivals);
@@ -42,6 +35,18 @@ pub(super) fn judged(family: &Family<'_, '_>, shows: &Shows, robot: RobotId, tes
         one_off: false,
     };
     SpreadTerm { judged, gain: shows.gain, robots: vec![robot], support }
+}
+
+/// The parameters of the catalogue, from those of a likelihood.
+pub(super) fn estimated(member: &Member, robot: RobotId, with: &Optimum, known: &Uncertainty) -> Estimated {
+    let parameters = &with.parameters;
+    let values = member.shown.iter().map(|shown| shown.value(parameters)).collect();
+    let errors = member.shown.iter().map(|shown| shown.error(parameters, known)).collect();
+    let mut term = Term::new(member.effect, Whose::Robot(robot), values);
+    for (free, shown) in term.free.iter_mut().zip(&member.shown) {
+        *free = !matches!(shown, Shown::Fixed(_));
+    }
+    Estimated { term, errors, profiled: Vec::new() }
 }
 
 /// The channel of an effect that shows in rows of this one: a row of sightings goes by its range.

@@ -12,6 +12,7 @@ mod density;
 mod executed;
 mod family;
 mod judge;
+mod known;
 mod maximum;
 mod missed;
 mod report;
@@ -37,6 +38,7 @@ use crate::diagnosis::term::Whose;
 use crate::diagnosis::unit::Unit;
 use crate::findings::{Undetected, Untestable};
 
+pub(crate) use known::{is_of_spread, known, known_swap};
 pub(crate) use swap::{Swaps, swaps};
 
 /// The effects that this stage estimates.
