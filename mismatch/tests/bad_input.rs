@@ -1,7 +1,12 @@
 //! Recordings that lack something or are damaged: the diagnosis says what it cannot test and why, claims
 //! nothing of it, tests the rest, and never panics.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "helpers of tests fail by panicking")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "helpers of tests fail by panicking"
+)]
 
 mod common;
 

@@ -1,6 +1,11 @@
 //! Recordings whose names, readings or encoders were changed by hand, as the diagnosis finds them.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail by panicking")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "helpers of tests fail by panicking"
+)]
 
 mod common;
 
@@ -127,7 +132,6 @@ fn sightings_that_are_taken_out_far_away_are_missed_by_range() {
     });
     let finding = only_finding(recording);
     assert_eq!(finding.effect.as_deref(), Some("missed_detections"));
-    eprintln!("{:?}", finding.parameters);
     for (parameter, size) in [("logit.constant", constant), ("logit.range", slope)] {
         let estimate = &finding.parameters[parameter];
         let reach = 0.8 * (estimate.ci95[1] - estimate.ci95[0]);

@@ -8,7 +8,8 @@ use pleiad_mismatch::{DiagnoseOptions, Finding, Findings, diagnose, models};
 use pleiad_recording::Recording;
 use pleiad_tests::changed::{commands_permuted, commands_reversed};
 use pleiad_tests::mrclam::{
-    CHANGES, Direction, Of, corrected, differences, directions, fitted_and_tested, mean_of, recording, refitted,
+    CHANGES, Direction, Of, corrected, differences, directions, fitted_and_tested, mean_of, recording,
+    refitted,
 };
 
 fn main() -> io::Result<()> {
@@ -85,7 +86,12 @@ fn print_directions() -> io::Result<()> {
             all.push(own);
         }
         for own in directions(test_on, &nominal, &corrected, 5.0) {
-            writeln!(out, "  nominal heading {:.4} position {:.4}", rms(own.heading.iter().map(|pair| pair.before)), rms(own.position.iter().map(|pair| pair.before)))?;
+            writeln!(
+                out,
+                "  nominal heading {:.4} position {:.4}",
+                rms(own.heading.iter().map(|pair| pair.before)),
+                rms(own.position.iter().map(|pair| pair.before))
+            )?;
         }
     }
     for (name, of) in [("heading", Of::Heading), ("position", Of::Position)] {

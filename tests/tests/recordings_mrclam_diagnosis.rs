@@ -13,7 +13,8 @@ use pleiad_estimation::RobotId;
 use pleiad_mismatch::{Diagnosis, Estimate, Finding};
 use pleiad_recording::Recording;
 use pleiad_tests::mrclam::{
-    CHANGES, Direction, Of, corrected, differences, directions, fitted_and_tested, mean_of, recording, refitted,
+    CHANGES, Direction, Of, corrected, differences, directions, fitted_and_tested, mean_of, recording,
+    refitted,
 };
 
 /// Dataset 6 and dataset 2.
@@ -32,9 +33,13 @@ fn diagnoses() -> &'static [Diagnosis; 2] {
 }
 
 /// The finding of a robot that holds a parameter.
-fn found<'a>(diagnosis: &'a Diagnosis, robot: RobotId, parameter: &str) -> Option<(&'a Finding, &'a Estimate)> {
-    let own = diagnosis.findings.findings.iter().filter(|finding| finding.robots == [robot.0]);
-    own.filter_map(|finding| Some((finding, finding.parameters.get(parameter)?))).next()
+fn found<'a>(
+    diagnosis: &'a Diagnosis,
+    robot: RobotId,
+    parameter: &str,
+) -> Option<(&'a Finding, &'a Estimate)> {
+    let mut own = diagnosis.findings.findings.iter().filter(|finding| finding.robots == [robot.0]);
+    own.find_map(|finding| Some((finding, finding.parameters.get(parameter)?)))
 }
 
 fn half_width(estimate: &Estimate) -> f64 {

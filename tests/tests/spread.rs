@@ -54,11 +54,7 @@ fn found(effects: &[(u32, Effect)], seed: u64, duration_s: f64) {
 
 #[test]
 fn noise_that_grows_with_range_a_walking_gyro_and_late_commands_are_told_apart() {
-    let effects = [
-        (1, Effect::RangeDependentNoise),
-        (2, Effect::GyroRandomWalk),
-        (3, Effect::CommandJitter),
-    ];
+    let effects = [(1, Effect::RangeDependentNoise), (2, Effect::GyroRandomWalk), (3, Effect::CommandJitter)];
     found(&effects, 101, 150.0);
 }
 
@@ -69,11 +65,8 @@ fn heavy_tails_blurred_bearings_and_lost_commands_are_told_apart() {
 
 #[test]
 fn wrong_names_swapped_landmarks_and_misses_are_told_apart() {
-    let effects = [
-        (1, Effect::IdentityMixUp),
-        (2, Effect::LandmarkIdentitySwap),
-        (3, Effect::MissedDetections),
-    ];
+    let effects =
+        [(1, Effect::IdentityMixUp), (2, Effect::LandmarkIdentitySwap), (3, Effect::MissedDetections)];
     found(&effects, 103, 150.0);
 }
 
@@ -103,8 +96,12 @@ fn nothing_is_named_where_noise_is_as_declared_and_sizes_that_would_have_been_fo
     ] {
         let (_, info) = Effect::from_name(effect).unwrap().info().parameter(parameter).unwrap();
         let typical = Effect::from_name(effect).unwrap().typical_values();
-        let position =
-            Effect::from_name(effect).unwrap().info().parameters.iter().position(|own| own.label() == parameter);
+        let position = Effect::from_name(effect)
+            .unwrap()
+            .info()
+            .parameters
+            .iter()
+            .position(|own| own.label() == parameter);
         let typical = typical[position.unwrap()];
         let own: Vec<_> = findings
             .undetected

@@ -64,7 +64,10 @@ pub(crate) fn left_out(units: &[&Unit<'_>], fit: &Fit, number: usize) -> (Vec<Te
                 }
             }
         }
-        State { noise: noise::estimate_from(unit, &terms, &residuals, &|index| training(unit, index)), residuals }
+        State {
+            noise: noise::estimate_from(unit, &terms, &residuals, &|index| training(unit, index)),
+            residuals,
+        }
     };
     let states = units.iter().zip(&fit.states).zip(&fit.columns).map(moved).collect();
     (terms, states)

@@ -165,11 +165,7 @@ impl<'a> Unit<'a> {
             });
             for row in &found.rows {
                 for component in 0..components {
-                    unit.rows.push(Row {
-                        time_s: row.time_s,
-                        regime: row.regime,
-                        target: row.target,
-                    });
+                    unit.rows.push(Row { time_s: row.time_s, regime: row.regime, target: row.target });
                     unit.scale_of.push(first_scale + component);
                     unit.agitation.push(row.du_squared()[component] * jitter_sigma_s * jitter_sigma_s);
                 }

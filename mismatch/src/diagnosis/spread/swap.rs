@@ -134,7 +134,11 @@ fn term(pair: Pair, whose: Whose, robots: Vec<RobotId>, p: f64, gain: Gain, test
     let effect = Effect::LandmarkIdentitySwap;
     let values = vec![f64::from(pair.0), f64::from(pair.1)];
     // Names have no error.
-    let estimated = Estimated { term: Term::new(effect, whose, values), errors: vec![Some(0.0); 2], profiled: Vec::new() };
+    let estimated = Estimated {
+        term: Term::new(effect, whose, values),
+        errors: vec![Some(0.0); 2],
+        profiled: Vec::new(),
+    };
     let p_familywise = (p * tests as f64).min(1.0);
     let named = p_familywise < FAMILYWISE && gain.total > GAIN_ERRORS * gain.standard_error;
     let judged = Judged {
