@@ -71,6 +71,8 @@ impl Scope {
 pub struct ActiveEffect<S> {
     effect: Effect,
     values: [S; MAX_PARAMETERS],
+    /// How many of the values are parameters: hooks ask millions of times.
+    count: usize,
     /// Where and when it acts.
     pub scope: Scope,
 }
@@ -94,16 +96,17 @@ impl<S: Scalar> ActiveEffect<S> {
             }
             *slot = value;
         }
-        Ok(Self { effect, values: all, scope: Scope::default() })
+        Ok(Self { effect, values: all, count: values.len(), scope: Scope::default() })
     }
 
     /// The effect with every parameter at the value that switches it off.
     pub fn off(effect: Effect) -> Self {
         let mut values = [S::zero(); MAX_PARAMETERS];
-        for (slot, parameter) in values.iter_mut().zip(effect.info().parameters) {
+        let parameters = effect.info().parameters;
+        for (slot, parameter) in values.iter_mut().zip(parameters) {
             *slot = S::constant(parameter.off);
         }
-        Self { effect, values, scope: Scope::default() }
+        Self { effect, values, count: parameters.len(), scope: Scope::default() }
     }
 
     /// The same within a scope.
@@ -118,7 +121,7 @@ impl<S: Scalar> ActiveEffect<S> {
 
     /// The values in the order of the parameters.
     pub fn values(&self) -> &[S] {
-        &self.values[..self.effect.info().parameters.len()]
+        &self.values[..self.count]
     }
 
     /// Replaces one value, found by its label.
@@ -171,6 +174,7 @@ impl<S: Scalar> RobotModel<S> {
     }
 
     /// Calls `hook` with every effect whose scope contains the context.
+    #[inline]
     pub fn apply(&self, context: &Context<S>, mut hook: impl FnMut(Effect, &[S])) {
         for active in self.effects.iter().filter(|active| active.scope.contains(context)) {
             hook(active.effect, active.values());
@@ -189,6 +193,7 @@ impl RobotModel<f64> {
             .map(|active| ActiveEffect {
                 effect: active.effect,
                 values: active.values.map(Dual::constant),
+                count: active.count,
                 scope: active.scope,
             })
             .collect();

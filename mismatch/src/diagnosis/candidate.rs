@@ -195,7 +195,7 @@ fn linearized(unit: &Unit<'_>, term: &Term, start: &Start, terms: &[Term], state
     model.effects.push(term.active());
     let variables: Vec<Variable> =
         start.along.iter().map(|&parameter| Variable::Effect { index, parameter }).collect();
-    unit.columns(&model, &variables, &channels)
+    unit.columns(&model, &variables, &|_, channel| channels(channel))
 }
 
 /// Keeps the columns that show somewhere.

@@ -233,22 +233,22 @@ fn all_columns(units: &[&Unit<'_>], terms: &[Term], slots: &[Slot]) -> Vec<Vec<C
 
 /// Columns of all slots for a unit; those of terms that do not act on it are empty.
 pub(crate) fn columns(unit: &Unit<'_>, terms: &[Term], slots: &[Slot]) -> Vec<Column> {
+    // The positions of the terms among the effects of the unit's model.
+    let mut next = unit.nominal.effects.len()..;
+    let places: Vec<Option<usize>> =
+        terms.iter().map(|term| term.acts_on(unit.robot).then(|| next.next()).flatten()).collect();
+    let own: Vec<usize> = (0..slots.len()).filter(|&slot| places[slots[slot].0].is_some()).collect();
+    let variables: Vec<Variable> = own
+        .iter()
+        .filter_map(|&slot| {
+            let (term, parameter) = slots[slot];
+            Some(Variable::Effect { index: places[term]?, parameter })
+        })
+        .collect();
+    let show = |position: usize, channel: Channel| touches(terms[slots[own[position]].0].effect, channel);
     let mut all = vec![Column::empty(unit); slots.len()];
-    let model = unit.model(terms);
-    let mut position = unit.nominal.effects.len();
-    for (index, term) in terms.iter().enumerate() {
-        if !term.acts_on(unit.robot) {
-            continue;
-        }
-        // The slots of a term go together: they touch the same channels.
-        let own: Vec<usize> = (0..slots.len()).filter(|&slot| slots[slot].0 == index).collect();
-        let variables: Vec<Variable> =
-            own.iter().map(|&slot| Variable::Effect { index: position, parameter: slots[slot].1 }).collect();
-        let found = unit.columns(&model, &variables, &|channel| touches(term.effect, channel));
-        for (slot, column) in own.into_iter().zip(found) {
-            all[slot] = column;
-        }
-        position += 1;
+    for (slot, column) in own.iter().zip(unit.columns(&unit.model(terms), &variables, &show)) {
+        all[*slot] = column;
     }
     all
 }

@@ -212,17 +212,24 @@ pub(crate) fn polish_some(
     if loose.is_empty() {
         return current;
     }
-    for _ in 0..2 {
+    for round in 0..2 {
         let mut terms = current.terms.clone();
+        let mut moved = false;
         for &slot in &loose {
             let profile = Profile::new(units, &current);
-            let value = profile.plateau(slot, best(&profile, slot));
+            let before = current.terms[slot.0].values[slot.1];
+            let value = profile.plateau(slot, best(&profile, slot, round == 0));
+            moved |= (value - before).abs() > steps(&current.terms[slot.0], slot.1).1;
             terms[slot.0].values[slot.1] = value;
             current.terms[slot.0].values[slot.1] = value;
         }
         match fit(units, terms, movable, effort) {
             Some(next) => current = next,
             None => return current,
+        }
+        // Another round is for parameters that follow each other.
+        if !moved || loose.len() == 1 {
+            break;
         }
     }
     current
@@ -234,14 +241,14 @@ pub(crate) fn is_on(term: &Term, parameter: usize) -> bool {
     term.values[parameter] != term.parameters()[parameter].off
 }
 
-/// The value of greatest likelihood: for a threshold the best of a grid, then by halving steps.
-fn best(profile: &Profile<'_, '_>, slot: Slot) -> f64 {
+/// The value of greatest likelihood: first the best of a grid, if it may be `far`, then by halving steps.
+fn best(profile: &Profile<'_, '_>, slot: Slot, far: bool) -> f64 {
     let term = &profile.fit.terms[slot.0];
     let parameter = &term.parameters()[slot.1];
     let at = |value: f64| profile.at(slot, value).unwrap_or(f64::NEG_INFINITY);
     let mut value = term.values[slot.1];
     let mut most = at(value);
-    if Placing::of(term.effect.info()).onset == Some(slot.1) {
+    if far && Placing::of(term.effect.info()).onset == Some(slot.1) {
         let (step_s, steps) = ONSET_GRID;
         for other in (-steps..=steps).map(|step| term.values[slot.1] + step_s * f64::from(step)) {
             let there = at(other);
@@ -250,7 +257,7 @@ fn best(profile: &Profile<'_, '_>, slot: Slot) -> f64 {
             }
         }
     }
-    if is_threshold(term, slot.1) {
+    if far && is_threshold(term, slot.1) {
         for other in thresholds(parameter, profile.units) {
             let there = at(other);
             if there > most {

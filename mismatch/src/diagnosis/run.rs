@@ -228,7 +228,7 @@ fn judgements(
 ) -> Vec<Judgement> {
     let mut all = Vec::new();
     for group in groups {
-        let Some(support) = support(units, fit, group, pool) else { continue };
+        let Some(support) = support(units, fit, group, pool, count) else { continue };
         let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
         let gain = if tests.is_empty() {
             cross_fitted(&acting, &support.with, &support.without)

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
-use pleiad_physics::{Channel as Needed, Effect, Stage};
+use pleiad_physics::{Channel as Needed, Effect, Parameter, Relevance};
 
 use crate::diagnosis::candidate::{Candidate, candidates};
 use crate::diagnosis::chi_square::upper_tail;
@@ -126,12 +126,15 @@ impl Pool {
         self.terms == Some(terms.len())
     }
 
-    /// Forgets candidates that added terms have changed much: a servo that answers otherwise or later moves
-    /// every effect between command and wheel in time.
+    /// Forgets candidates that added terms have changed much: a servo that answers later moves every effect
+    /// between command and wheel in time.
     fn forget(&mut self, added: &Term) {
-        let servo = added.effect.info().stage == Stage::Actuator;
+        let later = |parameter: &Parameter| {
+            matches!(parameter.relevance, Relevance::Lag(_) | Relevance::CommandLag(_))
+        };
+        let later = added.parameters().iter().any(later);
         self.known.retain(|&(effect, whose), _| {
-            !(servo && overlap(added.whose, whose) && effect.info().channels.contains(&Needed::Command))
+            !(later && overlap(added.whose, whose) && effect.info().channels.contains(&Needed::Command))
         });
     }
 }

@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use pleiad_physics::Effect;
 
 use crate::diagnosis::candidate::Candidate;
+use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::fit::{Effort, Fit, Slot, fit};
 use crate::diagnosis::naming::{Estimated, is_unseen, twin};
 use crate::diagnosis::parallel;
@@ -14,7 +15,7 @@ use crate::diagnosis::refine::refine;
 use crate::diagnosis::select::{Pool, Scored, covariance, fit_beside, overlap, score, whites};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::{Column, Unit};
-use crate::diagnosis::white::step;
+use crate::diagnosis::white::{White, step};
 
 /// A rival explains the data about equally if it loses less than this, twice in log-likelihood: odds of 20.
 pub(crate) const ODDS: f64 = 5.991_464_547_107_98;
@@ -22,6 +23,9 @@ pub(crate) const ODDS: f64 = 5.991_464_547_107_98;
 const RIVALS: usize = 8;
 /// A rival that gains less than this share by linearization does not explain it.
 const LEAST_SHARE: f64 = 0.5;
+
+/// Terms that are so likely without anything, among all tests, will not become a finding.
+const HOPELESS: f64 = 1.0;
 
 /// A finding with and without its terms, on the units that they act on.
 pub(crate) struct Support {
@@ -43,11 +47,19 @@ pub(crate) struct Support {
 
 /// Looks for rivals of terms of one robot, or of everyone, among candidates that were linearized beside the fit;
 /// one that the fit leaves nothing to explain may be exactly the same.
-/// `None` if the terms are too small to be a finding, or their parameters cannot be told apart.
-pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &Pool) -> Option<Support> {
+/// `None` if the terms are too small to be a finding, or their parameters cannot be told apart. Terms that are not
+/// significant among so many tests get no rivals.
+pub(crate) fn support(
+    units: &[&Unit<'_>],
+    full: &Fit,
+    group: &[usize],
+    pool: &Pool,
+    tests: usize,
+) -> Option<Support> {
     let chosen = &full.terms[*group.first()?];
-    let own: Vec<usize> = (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
-    let acting: Vec<&Unit<'_>> = own.iter().map(|&unit| units[unit]).collect();
+    let acting_at: Vec<usize> =
+        (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
+    let acting: Vec<&Unit<'_>> = acting_at.iter().map(|&unit| units[unit]).collect();
     let others: Vec<Term> = full
         .terms
         .iter()
@@ -75,21 +87,23 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &P
     if !relevant {
         return None;
     }
+    let without = fit(&acting, others, &|index| movable[index], Effort::RIVAL)?;
+    let whites = whites(&acting, &without);
+    let own = Own::of(&whites, &with, &without, count);
+    let parameters = own.columns.first().map_or(1, Vec::len).max(1);
+    let hopeless = upper_tail(own.ratio(&with, &without), parameters) * tests as f64 > HOPELESS;
+    let members: Vec<Effect> = group.iter().map(|&term| full.terms[term].effect).collect();
+    if hopeless {
+        let covariance = covariance(&acting, &with)?;
+        let inflation = own.inflation;
+        return Some(Support { units: acting_at, without, with, group: positions, covariance, members, inflation });
+    }
     let searched = |fit: &Fit, (term, parameter): Slot| term >= count && is_on(&fit.terms[term], parameter);
     let with =
         polish_some(&acting, with, &searched, &|index| index >= count || movable[index], Effort::RIVAL);
     let covariance = covariance(&acting, &with)?;
-    let without = fit(&acting, others, &|index| movable[index], Effort::RIVAL)?;
-
-    let whites = whites(&acting, &without);
-    let mine: Vec<usize> = (0..with.slots.len()).filter(|&slot| with.slots[slot].0 >= count).collect();
-    let columns: Vec<Vec<Column>> =
-        with.columns.iter().map(|columns| mine.iter().map(|&slot| columns[slot].clone()).collect()).collect();
-    let own_step =
-        step(&whites.iter().collect::<Vec<_>>(), &columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
-    let inflation = own_step.as_ref().map_or(1.0, |own| own.inflation.max(1.0));
-    // A threshold has no derivative, and so no step.
-    let own_gain = own_step.map_or(2.0 * (with.log_likelihood - without.log_likelihood), |own| own.gain);
+    let own = Own::of(&whites, &with, &without, count);
+    let inflation = own.inflation;
 
     let rescored =
         parallel::map(&rivals(units, full, chosen, pool), |candidate| score(&acting, &whites, candidate));
@@ -102,7 +116,7 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &P
     }
     let mut rivals: Vec<Scored> = best.into_values().collect();
     rivals.sort_by(|a, b| b.step.gain.total_cmp(&a.step.gain));
-    rivals.retain(|rival| rival.step.gain > LEAST_SHARE * own_gain);
+    rivals.retain(|rival| rival.step.gain > LEAST_SHARE * own.gain && own.is_taken_by(&acting, &whites, rival));
     rivals.truncate(RIVALS);
     let size = with.slots.len();
     let fitted = parallel::map(&rivals, |rival| {
@@ -121,12 +135,60 @@ pub(crate) fn support(units: &[&Unit<'_>], full: &Fit, group: &[usize], pool: &P
         }
         (lost(&both) < ODDS).then_some(rival.candidate.term.effect)
     });
-    let mut members: Vec<Effect> = group.iter().map(|&term| full.terms[term].effect).collect();
+    let mut members = members;
     members.extend(fitted.into_iter().flatten());
     if is_unseen(units, chosen) {
         members.extend(twin(chosen.effect).filter(|twin| !members.contains(twin)));
     }
-    Some(Support { units: own, without, with, group: positions, covariance, members, inflation })
+    Some(Support { units: acting_at, without, with, group: positions, covariance, members, inflation })
+}
+
+/// What a finding gains by linearization, beside everything but itself.
+struct Own {
+    /// Its columns by unit; none for a threshold, which has no derivative.
+    columns: Vec<Vec<Column>>,
+    gain: f64,
+    inflation: f64,
+    steps: bool,
+}
+
+impl Own {
+    fn of(whites: &[White<'_, '_>], with: &Fit, without: &Fit, first: usize) -> Self {
+        let mine: Vec<usize> = (0..with.slots.len()).filter(|&slot| with.slots[slot].0 >= first).collect();
+        let columns: Vec<Vec<Column>> = with
+            .columns
+            .iter()
+            .map(|columns| mine.iter().map(|&slot| columns[slot].clone()).collect())
+            .collect();
+        let each: Vec<&[Column]> = columns.iter().map(Vec::as_slice).collect();
+        let own = step(&whites.iter().collect::<Vec<_>>(), &each);
+        let inflation = own.as_ref().map_or(1.0, |own| own.inflation.max(1.0));
+        let steps = own.is_some();
+        let gain = own.map_or(2.0 * (with.log_likelihood - without.log_likelihood), |own| own.gain);
+        Self { columns, gain, inflation, steps }
+    }
+
+    /// Twice the log of the likelihood ratio, deflated by how much errors are correlated.
+    fn ratio(&self, with: &Fit, without: &Fit) -> f64 {
+        2.0 * (with.log_likelihood - without.log_likelihood) / self.inflation
+    }
+
+    /// Whether by linearization a rival takes enough of what the finding gains: one that explains something
+    /// else leaves it all.
+    fn is_taken_by(&self, units: &[&Unit<'_>], whites: &[White<'_, '_>], rival: &Scored) -> bool {
+        if !self.steps {
+            return true;
+        }
+        let all = rival.candidate.columns(units);
+        let both: Vec<Vec<Column>> = all
+            .iter()
+            .map(|(unit, columns)| columns.iter().chain(&self.columns[*unit]).cloned().collect())
+            .collect();
+        let acting: Vec<&White<'_, '_>> = all.iter().map(|(unit, _)| &whites[*unit]).collect();
+        let each: Vec<&[Column]> = both.iter().map(Vec::as_slice).collect();
+        // Beside what is the same, nothing can be told.
+        step(&acting, &each).is_none_or(|both| both.gain - rival.step.gain < (1.0 - LEAST_SHARE) * self.gain)
+    }
 }
 
 /// The candidates that act on the same robots, with the units numbered as those that act.

@@ -101,6 +101,11 @@ pub(crate) struct Unit<'a> {
     agitation: Vec<f64>,
 }
 
+/// So many variables are differentiated by at once.
+const MOST_AT_ONCE: usize = 8;
+/// An effect that no model has.
+const NO_VARIABLE: Variable = Variable::Effect { index: usize::MAX, parameter: 0 };
+
 /// Residuals of the channels asked for; the others are `None`.
 pub(crate) type Values = Vec<Option<Vec<f64>>>;
 
@@ -230,54 +235,53 @@ impl<'a> Unit<'a> {
             .then_some(values)
     }
 
-    /// Derivatives of the residuals with respect to variables of a model.
+    /// Derivatives of the residuals with respect to variables of a model; those that `show` in no channel, by
+    /// their positions, stay zero.
     pub(crate) fn columns(
         &self,
         model: &RobotModel<f64>,
         variables: &[Variable],
-        channels: &dyn Fn(Channel) -> bool,
+        show: &dyn Fn(usize, Channel) -> bool,
     ) -> Vec<Column> {
-        let mut columns = Vec::with_capacity(variables.len());
-        let mut rest = variables;
-        while !rest.is_empty() {
-            let length = match rest.len() {
-                1 => 1,
-                2 | 3 => 2,
-                _ => 4,
-            };
-            let (now, later) = rest.split_at(length);
-            rest = later;
-            match *now {
-                [a] => columns.extend(self.batch(model, &[a], channels)),
-                [a, b] => columns.extend(self.batch(model, &[a, b], channels)),
-                [a, b, c, d] => columns.extend(self.batch(model, &[a, b, c, d], channels)),
-                _ => {}
+        let mut columns = vec![Column::empty(self); variables.len()];
+        for (which, stretch) in self.stretches.iter().enumerate().filter(|(_, stretch)| stretch.rows > 0) {
+            let own: Vec<usize> =
+                (0..variables.len()).filter(|&position| show(position, stretch.channel)).collect();
+            // Many at once: what the model predicts is the same for all, and most of the work.
+            for positions in own.chunks(MOST_AT_ONCE) {
+                let now: Vec<Variable> = positions.iter().map(|&position| variables[position]).collect();
+                let parts = match now.len() {
+                    1 => self.batch::<1>(model, &now, stretch),
+                    2 => self.batch::<2>(model, &now, stretch),
+                    3 | 4 => self.batch::<4>(model, &now, stretch),
+                    _ => self.batch::<MOST_AT_ONCE>(model, &now, stretch),
+                };
+                for (&position, part) in positions.iter().zip(parts) {
+                    columns[position].parts[which] = part;
+                }
             }
         }
         columns
     }
 
+    /// The derivatives of a stretch with respect to at most `P` variables; `None` for one that is zero or not
+    /// finite.
     fn batch<const P: usize>(
         &self,
         model: &RobotModel<f64>,
-        variables: &[Variable; P],
-        channels: &dyn Fn(Channel) -> bool,
-    ) -> Vec<Column> {
-        let model: RobotModel<Dual<P>> = model.differentiated(variables);
-        let mut columns = vec![Column { parts: Vec::with_capacity(self.stretches.len()) }; P];
-        for stretch in &self.stretches {
-            let wanted = stretch.rows > 0 && channels(stretch.channel);
-            let values = if wanted { self.evaluated(&model, stretch) } else { None };
-            for (index, column) in columns.iter_mut().enumerate() {
-                let derivative = |value: &Dual<P>| value.derivatives()[index];
-                let part = values.as_ref().map(|values| values.iter().map(derivative).collect::<Vec<f64>>());
-                let part = part.filter(|part| {
-                    part.iter().all(|value| value.is_finite()) && part.iter().any(|value| *value != 0.0)
-                });
-                column.parts.push(part);
-            }
-        }
-        columns
+        variables: &[Variable],
+        stretch: &Stretch,
+    ) -> Vec<Option<Vec<f64>>> {
+        let mut padded = [NO_VARIABLE; P];
+        padded[..variables.len()].copy_from_slice(variables);
+        let model: RobotModel<Dual<P>> = model.differentiated(&padded);
+        let Some(values) = self.evaluated(&model, stretch) else { return vec![None; variables.len()] };
+        let derivative = |index: usize| {
+            let part: Vec<f64> = values.iter().map(|value| value.derivatives()[index]).collect();
+            let shows = part.iter().all(|value| value.is_finite()) && part.iter().any(|value| *value != 0.0);
+            shows.then_some(part)
+        };
+        (0..variables.len()).map(derivative).collect()
     }
 }
 
