@@ -57,9 +57,8 @@ pub(crate) fn support(
     tests: usize,
 ) -> Option<Support> {
     let chosen = &full.terms[*group.first()?];
-    let acting_at: Vec<usize> =
-        (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
-    let acting: Vec<&Unit<'_>> = acting_at.iter().map(|&unit| units[unit]).collect();
+    let own_units: Vec<usize> = (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
+    let acting: Vec<&Unit<'_>> = own_units.iter().map(|&unit| units[unit]).collect();
     let others: Vec<Term> = full
         .terms
         .iter()
@@ -90,41 +89,27 @@ pub(crate) fn support(
     let without = fit(&acting, others, &|index| movable[index], Effort::RIVAL)?;
     let whites = whites(&acting, &without);
     let own = Own::of(&whites, &with, &without, count);
-    let parameters = own.columns.first().map_or(1, Vec::len).max(1);
-    let hopeless = upper_tail(own.ratio(&with, &without), parameters) * tests as f64 > HOPELESS;
-    let members: Vec<Effect> = group.iter().map(|&term| full.terms[term].effect).collect();
-    if hopeless {
-        let covariance = covariance(&acting, &with)?;
-        let inflation = own.inflation;
-        return Some(Support { units: acting_at, without, with, group: positions, covariance, members, inflation });
-    }
+    let significant = upper_tail(own.ratio(&with, &without), own.parameters()) * tests as f64 <= HOPELESS;
     let searched = |fit: &Fit, (term, parameter): Slot| term >= count && is_on(&fit.terms[term], parameter);
-    let with =
-        polish_some(&acting, with, &searched, &|index| index >= count || movable[index], Effort::RIVAL);
+    let with = if significant {
+        polish_some(&acting, with, &searched, &|index| index >= count || movable[index], Effort::RIVAL)
+    } else {
+        with
+    };
     let covariance = covariance(&acting, &with)?;
     let own = Own::of(&whites, &with, &without, count);
     let inflation = own.inflation;
-
-    let rescored =
-        parallel::map(&rivals(units, full, chosen, pool), |candidate| score(&acting, &whites, candidate));
-    let mut best: BTreeMap<Effect, Scored> = BTreeMap::new();
-    for one in rescored.into_iter().flatten() {
-        let effect = one.candidate.term.effect;
-        if best.get(&effect).is_none_or(|known| one.step.gain > known.step.gain) {
-            best.insert(effect, one);
-        }
-    }
-    let mut rivals: Vec<Scored> = best.into_values().collect();
-    rivals.sort_by(|a, b| b.step.gain.total_cmp(&a.step.gain));
-    rivals.retain(|rival| rival.step.gain > LEAST_SHARE * own.gain && own.is_taken_by(&acting, &whites, rival));
-    rivals.truncate(RIVALS);
-    let size = with.slots.len();
+    let rivals = if significant {
+        own.rivals(&acting, &whites, &rivals(units, full, chosen, pool))
+    } else {
+        Vec::new()
+    };
     let fitted = parallel::map(&rivals, |rival| {
         let rival = refine(&acting, &whites, rival);
         let fit = fit_beside(&acting, &without, rival.term())?;
         let lost = |to: &Fit| 2.0 * (to.log_likelihood - fit.log_likelihood) / inflation;
         // A rival of more parameters that does no better is the finding in disguise.
-        if lost(&with) > ODDS || fit.slots.len() > size {
+        if lost(&with) > ODDS || fit.slots.len() > with.slots.len() {
             return None;
         }
         // It has to explain the same: beside a rival the finding is not needed. Another effect that also
@@ -135,37 +120,40 @@ pub(crate) fn support(
         }
         (lost(&both) < ODDS).then_some(rival.candidate.term.effect)
     });
-    let mut members = members;
+    let mut members: Vec<Effect> = group.iter().map(|&term| full.terms[term].effect).collect();
     members.extend(fitted.into_iter().flatten());
     if is_unseen(units, chosen) {
         members.extend(twin(chosen.effect).filter(|twin| !members.contains(twin)));
     }
-    Some(Support { units: acting_at, without, with, group: positions, covariance, members, inflation })
+    Some(Support { units: own_units, without, with, group: positions, covariance, members, inflation })
 }
 
-/// What a finding gains by linearization, beside everything but itself.
+/// What a finding gains beside everything but itself, by linearization.
 struct Own {
     /// Its columns by unit; none for a threshold, which has no derivative.
     columns: Vec<Vec<Column>>,
+    /// Of a step, twice in log-likelihood; for a threshold, of the fit.
     gain: f64,
+    is_step: bool,
     inflation: f64,
-    steps: bool,
 }
 
 impl Own {
     fn of(whites: &[White<'_, '_>], with: &Fit, without: &Fit, first: usize) -> Self {
         let mine: Vec<usize> = (0..with.slots.len()).filter(|&slot| with.slots[slot].0 >= first).collect();
-        let columns: Vec<Vec<Column>> = with
-            .columns
-            .iter()
-            .map(|columns| mine.iter().map(|&slot| columns[slot].clone()).collect())
-            .collect();
+        let of_unit =
+            |columns: &Vec<Column>| mine.iter().map(|&slot| columns[slot].clone()).collect::<Vec<_>>();
+        let columns: Vec<Vec<Column>> = with.columns.iter().map(of_unit).collect();
         let each: Vec<&[Column]> = columns.iter().map(Vec::as_slice).collect();
         let own = step(&whites.iter().collect::<Vec<_>>(), &each);
         let inflation = own.as_ref().map_or(1.0, |own| own.inflation.max(1.0));
-        let steps = own.is_some();
+        let is_step = own.is_some();
         let gain = own.map_or(2.0 * (with.log_likelihood - without.log_likelihood), |own| own.gain);
-        Self { columns, gain, inflation, steps }
+        Self { columns, gain, is_step, inflation }
+    }
+
+    fn parameters(&self) -> usize {
+        self.columns.first().map_or(1, Vec::len).max(1)
     }
 
     /// Twice the log of the likelihood ratio, deflated by how much errors are correlated.
@@ -173,10 +161,28 @@ impl Own {
         2.0 * (with.log_likelihood - without.log_likelihood) / self.inflation
     }
 
-    /// Whether by linearization a rival takes enough of what the finding gains: one that explains something
-    /// else leaves it all.
+    /// The strongest start of every effect that may explain the finding.
+    fn rivals(&self, units: &[&Unit<'_>], whites: &[White<'_, '_>], candidates: &[Candidate]) -> Vec<Scored> {
+        let scored = parallel::map(candidates, |candidate| score(units, whites, candidate));
+        let mut best: BTreeMap<Effect, Scored> = BTreeMap::new();
+        for one in scored.into_iter().flatten() {
+            let effect = one.candidate.term.effect;
+            if best.get(&effect).is_none_or(|known| one.step.gain > known.step.gain) {
+                best.insert(effect, one);
+            }
+        }
+        let mut rivals: Vec<Scored> = best.into_values().collect();
+        rivals.retain(|rival| {
+            rival.step.gain > LEAST_SHARE * self.gain && self.is_taken_by(units, whites, rival)
+        });
+        rivals.sort_by(|a, b| b.step.gain.total_cmp(&a.step.gain));
+        rivals.truncate(RIVALS);
+        rivals
+    }
+
+    /// Whether a rival takes enough of the gain: one that explains something else leaves it all.
     fn is_taken_by(&self, units: &[&Unit<'_>], whites: &[White<'_, '_>], rival: &Scored) -> bool {
-        if !self.steps {
+        if !self.is_step {
             return true;
         }
         let all = rival.candidate.columns(units);
