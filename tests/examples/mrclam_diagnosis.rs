@@ -1,5 +1,6 @@
 //! Writes the figures of `docs/benchmarks/mrclam-diagnosis.md`:
-//! `cargo run -p pleiad-tests --example mrclam_diagnosis -- differences|controls|directions`.
+//! `cargo run -p pleiad-tests --example mrclam_diagnosis -- differences`, with `controls`, or with
+//! `directions MODEL MODEL`: two `corrected.toml` that `pleiad diagnose` fitted on dataset 6 and on dataset 2.
 
 use std::io::{self, Write as _};
 use std::path::Path;
@@ -8,20 +9,18 @@ use pleiad_estimation::RobotId;
 use pleiad_mismatch::{Finding, Findings, models};
 use pleiad_recording::Recording;
 use pleiad_tests::mrclam::{
-    CHANGES, CONTROLS, Direction, Of, agents_error_m, corrected, differences, directions, fitted_and_tested,
-    mean_of, recording, refitted, write_corrected,
+    CHANGES, CONTROLS, Direction, Of, agents_error_m, differences, directions, fitted_and_tested, mean_of,
+    read, recording, refitted,
 };
 
 fn main() -> io::Result<()> {
-    for part in std::env::args().skip(1) {
-        match part.as_str() {
-            "differences" => print_differences()?,
-            "controls" => print_controls()?,
-            "directions" => print_directions()?,
-            other => writeln!(io::stderr(), "{other}: expected differences, controls or directions")?,
-        }
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["differences"] => print_differences(),
+        ["controls"] => print_controls(),
+        ["directions", on_six, on_two] => print_directions([on_six, on_two].map(Path::new)),
+        _ => writeln!(io::stderr(), "expected differences, controls, or directions with two models"),
     }
-    Ok(())
 }
 
 fn print_differences() -> io::Result<()> {
@@ -64,23 +63,17 @@ fn print_agents(number: u32, model: &Path) -> io::Result<()> {
     Ok(())
 }
 
-fn print_directions() -> io::Result<()> {
+/// What the models found on dataset 6 and on dataset 2 are worth on the other.
+fn print_directions(found: [&Path; 2]) -> io::Result<()> {
     let mut out = io::stdout();
-    let numbers = [6, 2];
-    let recordings = numbers.map(recording);
-    let folder = tempfile::tempdir()?;
+    let recordings = [6, 2].map(recording);
     let mut all: Vec<Direction> = Vec::new();
-    for [first, second] in [[0, 1], [1, 0]] {
+    for ([first, second], model) in [[0, 1], [1, 0]].into_iter().zip(found) {
         let (fit_on, test_on): (&Recording, &Recording) = (&recordings[first], &recordings[second]);
-        writeln!(out, "fitted on {}", fit_on.name)?;
-        let diagnosis = fitted_and_tested(fit_on, test_on);
-        print_findings(&diagnosis.findings)?;
-        let model = folder.path().join("corrected.toml");
-        write_corrected(&diagnosis, test_on, &model);
-        print_agents(numbers[second], &model)?;
+        print_agents([6, 2][second], model)?;
         let refitted = refitted(fit_on, test_on);
         let nominal = models(test_on).map_err(io::Error::other)?;
-        let corrected = corrected(&diagnosis, test_on);
+        let corrected = read(model, test_on);
         for own in directions(test_on, &refitted, &corrected, 5.0) {
             let RobotId(robot) = own.robot;
             writeln!(

@@ -137,6 +137,13 @@ pub fn corrected(diagnosis: &Diagnosis, recording: &Recording) -> BTreeMap<Robot
     recording.robots.keys().map(model).collect()
 }
 
+/// The models of the robots of a recording, from a file such as a `corrected.toml`.
+pub fn read(path: &Path, recording: &Recording) -> BTreeMap<RobotId, RobotModel<f64>> {
+    let nominal = pleiad_recording::read_model(path, &mut Vec::new()).expect("a model that can be read");
+    let model = |&robot: &RobotId| (robot, nominal.model(robot).expect("a model of every robot"));
+    recording.robots.keys().map(model).collect()
+}
+
 /// What a robot's predictions are worth on a recording that neither model was fitted on.
 pub struct Direction {
     /// Which robot.
