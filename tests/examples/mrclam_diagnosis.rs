@@ -1,27 +1,26 @@
 //! Writes the figures of `docs/benchmarks/mrclam-diagnosis.md`:
-//! `cargo run -p pleiad-tests --example mrclam_diagnosis -- differences|controls|directions`.
+//! `cargo run -p pleiad-tests --example mrclam_diagnosis -- differences`, with `controls`, or with
+//! `directions MODEL MODEL`: two `corrected.toml` that `pleiad diagnose` fitted on dataset 6 and on dataset 2.
 
 use std::io::{self, Write as _};
+use std::path::Path;
 
 use pleiad_estimation::RobotId;
-use pleiad_mismatch::{DiagnoseOptions, Finding, Findings, diagnose, models};
+use pleiad_mismatch::{Finding, Findings, models};
 use pleiad_recording::Recording;
-use pleiad_tests::changed::{commands_permuted, commands_reversed};
 use pleiad_tests::mrclam::{
-    CHANGES, Direction, Of, corrected, differences, directions, fitted_and_tested, mean_of, recording,
-    refitted,
+    CHANGES, CONTROLS, Direction, Of, agents_error_m, differences, directions, fitted_and_tested, mean_of,
+    read, recording, refitted,
 };
 
 fn main() -> io::Result<()> {
-    for part in std::env::args().skip(1) {
-        match part.as_str() {
-            "differences" => print_differences()?,
-            "controls" => print_controls()?,
-            "directions" => print_directions()?,
-            other => writeln!(io::stderr(), "{other}: expected differences, controls or directions")?,
-        }
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["differences"] => print_differences(),
+        ["controls"] => print_controls(),
+        ["directions", on_six, on_two] => print_directions([on_six, on_two].map(Path::new)),
+        _ => writeln!(io::stderr(), "expected differences, controls, or directions with two models"),
     }
-    Ok(())
 }
 
 fn print_differences() -> io::Result<()> {
@@ -46,32 +45,35 @@ fn print_differences() -> io::Result<()> {
 }
 
 fn print_controls() -> io::Result<()> {
-    let recording = recording(6);
-    let controls = [
-        ("unchanged", recording.clone()),
-        ("permuted", commands_permuted(recording.clone(), 20.0, 1)),
-        ("reversed", commands_reversed(recording)),
-    ];
-    for (name, recording) in controls {
+    let recordings = [6, 2].map(recording);
+    for (name, control) in CONTROLS {
         writeln!(io::stdout(), "{name}")?;
-        let found = diagnose(&[recording], &DiagnoseOptions::default()).map_err(io::Error::other)?;
-        print_findings(&found.findings)?;
+        let [six, two] = recordings.clone().map(control);
+        print_findings(&fitted_and_tested(&six, &two).findings)?;
     }
     Ok(())
 }
 
-fn print_directions() -> io::Result<()> {
+/// Errors of agents that are told nothing and of agents that load the corrected model.
+fn print_agents(number: u32, model: &Path) -> io::Result<()> {
+    for landmarks in ["none", "known"] {
+        let [without, with] = [None, Some(model)].map(|model| agents_error_m(number, landmarks, model));
+        writeln!(io::stdout(), "agents on {number}, landmarks {landmarks}: {without:.4} -> {with:.4} m")?;
+    }
+    Ok(())
+}
+
+/// What the models found on dataset 6 and on dataset 2 are worth on the other.
+fn print_directions(found: [&Path; 2]) -> io::Result<()> {
     let mut out = io::stdout();
     let recordings = [6, 2].map(recording);
     let mut all: Vec<Direction> = Vec::new();
-    for [fit_on, test_on] in [[0, 1], [1, 0]] {
-        let (fit_on, test_on): (&Recording, &Recording) = (&recordings[fit_on], &recordings[test_on]);
-        writeln!(out, "fitted on {}", fit_on.name)?;
-        let diagnosis = fitted_and_tested(fit_on, test_on);
-        print_findings(&diagnosis.findings)?;
+    for ([first, second], model) in [[0, 1], [1, 0]].into_iter().zip(found) {
+        let (fit_on, test_on): (&Recording, &Recording) = (&recordings[first], &recordings[second]);
+        print_agents([6, 2][second], model)?;
         let refitted = refitted(fit_on, test_on);
         let nominal = models(test_on).map_err(io::Error::other)?;
-        let corrected = corrected(&diagnosis, test_on);
+        let corrected = read(model, test_on);
         for own in directions(test_on, &refitted, &corrected, 5.0) {
             let RobotId(robot) = own.robot;
             writeln!(
@@ -117,7 +119,7 @@ fn print_findings(findings: &Findings) -> io::Result<()> {
             writeln!(out, "      {label} {:+.4} [{low:+.4}, {high:+.4}] {}", estimate.value, estimate.unit)?;
         }
     }
-    for note in &findings.notes {
+    for note in findings.notes.iter().filter(|note| note.ends_with("no finding")) {
         writeln!(out, "  note: {note}")?;
     }
     Ok(())

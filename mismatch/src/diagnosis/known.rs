@@ -13,7 +13,7 @@ use crate::builtin;
 use crate::diagnosis::candidate::candidates;
 use crate::diagnosis::entries::is_shared;
 use crate::diagnosis::fit::{Effort, Fit, fit};
-use crate::diagnosis::naming::{Estimated, Z_95};
+use crate::diagnosis::naming::{Estimated, Z_95, groups, total};
 use crate::diagnosis::profile::{Profile, polish};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::run::{Prepared, unit};
@@ -23,6 +23,7 @@ use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
+use crate::findings::Estimate;
 
 /// So many of the strongest starts are fitted.
 const STARTS: usize = 6;
@@ -65,6 +66,9 @@ pub struct KnownFit {
     pub robots: Vec<RobotId>,
     /// In the order of the effect's parameters.
     pub parameters: Vec<KnownParameter>,
+    /// Of lag or delay fitted together on a robot without encoders: their sum, seconds, which is known far
+    /// better than either.
+    pub total: Option<KnownParameter>,
 }
 
 impl KnownFit {
@@ -149,9 +153,23 @@ fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
     let covariance =
         found.unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
     let profile = Profile::new(units, fit);
+    let groups = groups(units, &fit.terms);
     let one = |position: usize| {
         let estimated = Estimated::of(fit, &covariance, position);
-        known_fit(units, &estimated, &|index| profile.interval((position, index)))
+        let mut own = known_fit(units, &estimated, &|index| profile.interval((position, index)));
+        own.total =
+            groups.iter().filter(|group| group.len() > 1 && group.contains(&position)).find_map(|group| {
+                let (label, Estimate { value, ci95, .. }) = total(units, (fit, &covariance, group))?;
+                Some(KnownParameter {
+                    label,
+                    unit: "s",
+                    value,
+                    standard_error: Some((ci95[1] - ci95[0]) / (2.0 * Z_95)),
+                    ci95: Some(ci95),
+                    interval: Interval::Sandwich,
+                })
+            });
+        own
     };
     (0..fit.terms.len()).map(one).collect()
 }
@@ -190,5 +208,6 @@ fn known_fit(
         effect: term.effect,
         robots: units.iter().map(|unit| unit.robot).filter(|&robot| term.acts_on(robot)).collect(),
         parameters: (0..term.values.len()).map(parameter).collect(),
+        total: None,
     }
 }

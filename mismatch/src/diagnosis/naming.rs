@@ -190,7 +190,7 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
 
 /// Lag and delay together: without encoders their sum is known far better than either, and one of them may
 /// have vanished.
-fn total(
+pub(crate) fn total(
     units: &[&Unit<'_>],
     (fit, covariance, group): (&Fit, &DMatrix<f64>, &[usize]),
 ) -> Option<(String, Estimate)> {

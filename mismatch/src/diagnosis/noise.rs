@@ -4,6 +4,7 @@
 //! it is for a normal distribution. For normal residuals it is their standard deviation; up to a tenth of wild
 //! ones moves it little. With the scales profiled out, a model's log-likelihood is `-sum n log s`.
 
+use crate::channel::Channel;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::Unit;
 
@@ -13,6 +14,11 @@ pub(crate) const CLIP: f64 = 5.0;
 const TRIM: f64 = 9.0;
 /// The mean of `min(z^2, 9)` of a standard normal: `1 - 2 (3 phi(3) + Q(3)) + 18 Q(3)`.
 const NORMAL_MEAN: f64 = 0.995_007_302_8;
+/// A bearing that is off by more than this, radians, and by more than so many scales, is that of something else
+/// than its name says: no effect of a camera turns it so far, and a target that is really behind the robot has
+/// leverage on everything that grows with the bearing.
+const ELSEWHERE_RAD: f64 = 0.5;
+const ELSEWHERE_SCALES: f64 = 20.0;
 /// Smallest scale relative to the largest residual: keeps residuals without noise finite.
 const SMALLEST: f64 = 1e-12;
 /// Rounds in which scale and the share of agitated variance settle.
@@ -21,7 +27,8 @@ const AGITATED_ROUNDS: usize = 4;
 /// The noise of a unit.
 #[derive(Clone, Debug)]
 pub(crate) struct Noise {
-    /// One sigma per element, in the unit of the residual.
+    /// One sigma per element, in the unit of the residual; infinite for a bearing of something else than its
+    /// name says.
     pub(crate) sigma: Vec<f64>,
     /// One sigma per scale, of elements that are not agitated.
     pub(crate) scales: Vec<f64>,
@@ -81,9 +88,22 @@ pub(crate) fn estimate_from(
         noise.per_scale.push(-cost);
         noise.log_likelihood -= cost;
     }
-    let sigma = |(agitation, &scale): (&f64, &usize)| noise.scales[scale].hypot(agitation.sqrt());
-    noise.sigma = agitation.iter().zip(&unit.scale_of).map(sigma).collect();
+    let sigma = |((agitation, &which), residual): ((&f64, &usize), &f64)| {
+        let scale = noise.scales[which];
+        if is_elsewhere(unit.scales[which].0, *residual, scale) {
+            f64::INFINITY
+        } else {
+            scale.hypot(agitation.sqrt())
+        }
+    };
+    noise.sigma = agitation.iter().zip(&unit.scale_of).zip(residuals).map(sigma).collect();
     noise
+}
+
+/// Whether a residual is that of a bearing of something else than its name says.
+fn is_elsewhere(channel: Channel, residual: f64, scale: f64) -> bool {
+    matches!(channel, Channel::BearingToLandmark | Channel::BearingToRobot)
+        && residual.abs() > ELSEWHERE_RAD.max(ELSEWHERE_SCALES * scale)
 }
 
 /// The M-scale about zero of values, which are reordered.
@@ -117,6 +137,14 @@ mod tests {
         let mut values = [3.0, -4.0, 5.0, -1.0, 2.0];
         let rms = (55.0_f64 / 5.0).sqrt();
         assert!((m_scale(&mut values) - rms / NORMAL_MEAN.sqrt()).abs() < 1e-7);
+    }
+
+    #[test]
+    fn only_a_bearing_far_off_for_its_own_noise_is_of_something_else() {
+        assert!(is_elsewhere(Channel::BearingToRobot, -0.6, 0.02));
+        assert!(!is_elsewhere(Channel::BearingToRobot, 0.4, 0.02));
+        assert!(!is_elsewhere(Channel::BearingToLandmark, 0.6, 0.1));
+        assert!(!is_elsewhere(Channel::RangeToRobot, 60.0, 0.02));
     }
 
     #[test]

@@ -25,6 +25,10 @@ pub struct Change {
 /// What commands show without encoders, in the order in which it is fitted.
 const DRIVEN: &[Effect] = &[Effect::TurnLoss, Effect::ActuatorGain, Effect::CommandDelay];
 
+/// What shows when commands are late. A delay alone stands in for the robots' lag, and where it settles then
+/// hangs on where the windows lie; the sum of both does not.
+const LATE: &[Effect] = &[Effect::ActuatorLag, Effect::CommandDelay, Effect::TurnLoss, Effect::ActuatorGain];
+
 /// The changes that are tried.
 ///
 /// Commands that are a share `s` too large need a gain `g` for the same motion: `1 + g' = (1 + g) / (1 + s)`.
@@ -49,14 +53,14 @@ pub const CHANGES: &[Change] = &[
     },
     Change {
         name: "commands stamped 0.08 s later",
-        effects: DRIVEN,
-        moves: &[(Effect::CommandDelay, "delay_s", |delay_s| delay_s - 0.08)],
+        effects: LATE,
+        moves: &[(Effect::CommandDelay, "total_s", |total_s| total_s - 0.08)],
         apply: |recording| changed::commands_later(recording, 0.08),
     },
     Change {
         name: "commands stamped 0.08 s earlier",
-        effects: DRIVEN,
-        moves: &[(Effect::CommandDelay, "delay_s", |delay_s| delay_s + 0.08)],
+        effects: LATE,
+        moves: &[(Effect::CommandDelay, "total_s", |total_s| total_s + 0.08)],
         apply: |recording| changed::commands_later(recording, -0.08),
     },
     Change {
@@ -115,7 +119,10 @@ pub fn differences(recording: &Recording, change: &Change) -> Vec<Difference> {
             .map(|recording| fit_known(recording, robot, change.effects).expect("models of a recording"));
         let of = |which: usize, effect: Effect, label: &str| -> &KnownParameter {
             let fit = fits[which].iter().find(|fit| fit.effect == effect);
-            let parameter = fit.and_then(|fit| fit.parameter(label));
+            let parameter = fit.and_then(|fit| {
+                let total = fit.total.as_ref().filter(|total| total.label == label);
+                fit.parameter(label).or(total)
+            });
             parameter.unwrap_or_else(|| panic!("{effect:?} does not show on robot {robot}"))
         };
         let one = |&(effect, label, moved): &(Effect, &'static str, fn(f64) -> f64)| {

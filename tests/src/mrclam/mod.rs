@@ -10,17 +10,21 @@
 
 mod differences;
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use pleiad_estimation::RobotId;
 use pleiad_mismatch::{
-    DiagnoseOptions, Diagnosis, Evidence, KnownFit, Rollout, diagnose, fit_known, models, rollouts,
+    DiagnoseOptions, Diagnosis, Evidence, Finding, KnownFit, Rollout, Verdict, diagnose, fit_known, models,
+    rollouts,
 };
 use pleiad_physics::{ActiveEffect, Effect, RobotModel};
 use pleiad_recording::{ReadOptions, Recording};
 
 use crate::bootstrap::{Pair, Reduction, mean_reduction};
+use crate::changed::{commands_permuted, commands_reversed};
+use crate::program;
 pub use differences::{CHANGES, Change, Difference, differences};
 
 /// What anyone would refit first: the scales of forward motion and of turns.
@@ -54,6 +58,59 @@ pub fn fitted_and_tested(fit_on: &Recording, test_on: &Recording) -> Diagnosis {
     diagnose(&[fit_on.clone(), test_on.clone()], &options).expect("recordings that can be compared")
 }
 
+/// Blocks of commands that are permuted, seconds: many times the lag of a robot.
+const PERMUTED_S: f64 = 20.0;
+
+/// A change after which commands and motion have nothing to do with each other.
+pub type Control = fn(Recording) -> Recording;
+
+/// The negative controls, by name.
+pub const CONTROLS: [(&str, Control); 2] = [
+    ("commands permuted in blocks of 20 s", |recording| commands_permuted(recording, PERMUTED_S, 1)),
+    ("commands in the opposite order", commands_reversed),
+];
+
+/// The effects that a diagnosis names, robot by robot.
+pub fn named(diagnosis: &Diagnosis) -> BTreeSet<(u32, String)> {
+    let is_name = |own: &&Finding| matches!(own.verdict, Verdict::Named | Verdict::BadData);
+    let names = |own: &Finding| -> Vec<(u32, String)> {
+        let effect = own.effect.clone().unwrap_or_default();
+        own.robots.iter().map(|&robot| (robot, effect.clone())).collect()
+    };
+    diagnosis.findings.findings.iter().filter(is_name).flat_map(names).collect()
+}
+
+/// The effects that a diagnosis shows, robot by robot: named, or in a set of which one is there.
+pub fn shown(diagnosis: &Diagnosis) -> BTreeSet<(u32, String)> {
+    let sets = |own: &Finding| -> Vec<(u32, String)> {
+        let pairs = |&robot: &u32| own.support_set.iter().map(move |effect| (robot, effect.clone()));
+        own.robots.iter().flat_map(pairs).collect()
+    };
+    diagnosis.findings.findings.iter().flat_map(sets).collect()
+}
+
+/// The mean position error of a team of agents, metres, over the first ten minutes of a dataset, by
+/// `pleiad replay`.
+pub fn agents_error_m(number: u32, landmarks: &str, model: Option<&Path>) -> f64 {
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let mut command = Command::new(program::pleiad());
+    command.arg("replay").arg(folder(number)).args(["--seconds", "600", "--landmarks", landmarks, "--json"]);
+    command.arg("--out").arg(out.path().join("run"));
+    if let Some(model) = model {
+        command.arg("--model").arg(model);
+    }
+    let output = command.output().expect("pleiad can be run");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    summary["mean_position_rmse_m"].as_f64().expect("an error where there is truth")
+}
+
+/// Writes what `pleiad diagnose` writes as `corrected.toml`.
+pub fn write_corrected(diagnosis: &Diagnosis, recording: &Recording, path: &Path) {
+    let model = &diagnosis.corrected[&recording.name];
+    pleiad_recording::write_model(path, model, "").expect("a model that can be written");
+}
+
 /// Effects as a model applies them.
 pub fn active(fits: &[KnownFit]) -> Vec<ActiveEffect<f64>> {
     let one = |fit: &KnownFit| {
@@ -76,6 +133,13 @@ pub fn refitted(fit_on: &Recording, test_on: &Recording) -> BTreeMap<RobotId, Ro
 /// The models that a diagnosis gives to a recording.
 pub fn corrected(diagnosis: &Diagnosis, recording: &Recording) -> BTreeMap<RobotId, RobotModel<f64>> {
     let nominal = &diagnosis.corrected[&recording.name];
+    let model = |&robot: &RobotId| (robot, nominal.model(robot).expect("a model of every robot"));
+    recording.robots.keys().map(model).collect()
+}
+
+/// The models of the robots of a recording, from a file such as a `corrected.toml`.
+pub fn read(path: &Path, recording: &Recording) -> BTreeMap<RobotId, RobotModel<f64>> {
+    let nominal = pleiad_recording::read_model(path, &mut Vec::new()).expect("a model that can be read");
     let model = |&robot: &RobotId| (robot, nominal.model(robot).expect("a model of every robot"));
     recording.robots.keys().map(model).collect()
 }
