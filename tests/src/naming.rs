@@ -30,7 +30,7 @@ pub enum Fate {
 pub struct Told {
     /// What became of it.
     pub fate: Fate,
-    /// Its rivals; of a wrong one, every finding.
+    /// Its rivals; where it is not found, every finding and what is said to be none.
     pub rivals: Vec<String>,
     /// Findings beside the right one, each a false one.
     pub extra: Vec<String>,
@@ -55,13 +55,17 @@ fn judged(effect: Effect, robots: &[u32], found: &Findings) -> Told {
     let right =
         |own: &&Finding| own.robots == robots && own.support_set.iter().any(|member| member == info.name);
     let Some(own) = found.findings.iter().find(right) else {
-        let all: Vec<String> = found.findings.iter().map(told).collect();
+        let mut all: Vec<String> = found.findings.iter().map(told).collect();
         let untestable = found.untestable.iter().any(|one| one.effect == info.name);
+        // Two effects that together are the same as this one, as is said.
+        let said = format!("cannot be told from {} ", info.name);
         let fate = match (all.is_empty(), untestable) {
+            _ if found.notes.iter().any(|note| note.contains(&said)) => Fate::InSet,
             (true, true) => Fate::Untestable,
             (true, false) => Fate::Missed,
             (false, _) => Fate::Wrong,
         };
+        all.extend(found.notes.iter().filter(|note| note.contains("no finding")).cloned());
         return Told { fate, rivals: all, extra: Vec::new() };
     };
     let alone = matches!(own.verdict, Verdict::Named | Verdict::BadData) && own.support_set.len() == 1;
