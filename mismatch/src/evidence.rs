@@ -75,6 +75,11 @@ impl<'a> Evidence<'a> {
         Some((self.recording.robots.get(&robot)?, self.tracks.get(&robot)?))
     }
 
+    /// Whether there is no more than one robot.
+    pub(crate) fn is_of_one(&self) -> bool {
+        self.tracks.len() < 2
+    }
+
     /// What is known of a robot, and what there is to compare.
     pub(crate) fn prepared(&self, robot: RobotId) -> Option<(&Track, &Plans)> {
         Some((self.tracks.get(&robot)?, self.plans.get(&robot)?))

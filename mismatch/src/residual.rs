@@ -145,14 +145,18 @@ impl fmt::Display for Omission {
         match self {
             Self::NotRecorded(what) => write!(f, "{what} not recorded"),
             Self::Constant(what, count) => write!(f, "{what} never change ({count} equal readings)"),
-            Self::NoWheels(robot, count) => write!(f, "{count} without odometry of robot {robot} around"),
-            Self::NoTruth(robot, count) => write!(f, "{count} without truth of robot {robot} near"),
-            Self::NotInMap(count) => write!(f, "{count} of landmarks that are not in the map"),
-            Self::NoCommand(count) => write!(f, "{count} windows at the ends of the commands"),
-            Self::CommandGap(count) => write!(f, "{count} windows in or soon after gaps of the commands"),
+            Self::NoWheels(robot, count) => {
+                write!(f, "{count} left out, no odometry of robot {robot} around")
+            }
+            Self::NoTruth(robot, count) => write!(f, "{count} left out, no truth of robot {robot} near"),
+            Self::NotInMap(count) => write!(f, "{count} left out, of landmarks that are not in the map"),
+            Self::NoCommand(count) => write!(f, "{count} windows left out at the ends of the commands"),
+            Self::CommandGap(count) => {
+                write!(f, "{count} windows left out, in or soon after gaps of the commands")
+            }
             Self::ByStages => write!(f, "wheel angles are recorded: compared stage by stage"),
-            Self::SparseWindow(count) => write!(f, "{count} windows with too few readings"),
-            Self::NotFinite(count) => write!(f, "{count} that are no finite numbers"),
+            Self::SparseWindow(count) => write!(f, "{count} windows left out, with too few readings"),
+            Self::NotFinite(count) => write!(f, "{count} left out that are no finite numbers"),
             Self::TooFew(found, needed) => write!(f, "{found} residuals, a summary needs {needed}"),
         }
     }

@@ -88,7 +88,7 @@ const TABLE: &[Damaged] = &[
         verdict: Verdict::NothingMissing,
         untestable: &[],
         tested: &["track_width_error", "gps_lever_arm", "range_bias"],
-        notes: &["robot 1, gps: 234 without truth of robot 1 near"],
+        notes: &["robot 1, gps: 234 left out, no truth of robot 1 near"],
     },
     Damaged {
         name: "truth by a clock that is a thousand seconds ahead",
@@ -96,20 +96,20 @@ const TABLE: &[Damaged] = &[
             own(recording).truth.iter_mut().for_each(|sample| sample.time.0 += 1_000_000_000_000);
         },
         verdict: Verdict::Untestable,
-        untestable: &[("gps_lever_arm", "480 without truth of robot 1 near")],
+        untestable: &[("gps_lever_arm", "480 left out, no truth of robot 1 near")],
         tested: &["command_delay"],
-        notes: &["robot 1, gps: 480 without truth of robot 1 near"],
+        notes: &["robot 1, gps: 480 left out, no truth of robot 1 near"],
     },
     Damaged {
         name: "no landmarks in the map",
         damage: |recording| recording.landmarks.clear(),
         verdict: Verdict::NothingMissing,
         untestable: &[
-            ("range_bias", "1200 of landmarks that are not in the map"),
-            ("sensor_lever_arm", "1200 of landmarks that are not in the map"),
+            ("range_bias", "1200 left out, of landmarks that are not in the map"),
+            ("sensor_lever_arm", "1200 left out, of landmarks that are not in the map"),
         ],
         tested: &["track_width_error", "gps_lever_arm"],
-        notes: &["robot 1, bearing_to_landmark: 1200 of landmarks that are not in the map"],
+        notes: &["robot 1, bearing_to_landmark: 1200 left out, of landmarks that are not in the map"],
     },
     Damaged {
         name: "three seconds",
@@ -188,7 +188,7 @@ const TABLE: &[Damaged] = &[
         verdict: Verdict::NothingMissing,
         untestable: &[("gyro_bias", "that are no finite numbers")],
         tested: &["track_width_error", "gps_lever_arm"],
-        notes: &["gyro: 238 that are no finite numbers"],
+        notes: &["gyro: 238 left out that are no finite numbers"],
     },
     Damaged {
         name: "commands that are not finite, handed over in memory",

@@ -9,7 +9,7 @@ use crate::table::{Row, Table, shown};
 use crate::tidy::{Stamped, tidy};
 
 /// What a user can do about a bad row.
-const REMEDY: &str = "repair or remove the line, or read with bad rows skipped";
+const REMEDY: &str = "repair or remove the line, or read with bad rows skipped (--skip-bad-rows)";
 
 /// How damaged input is treated.
 ///

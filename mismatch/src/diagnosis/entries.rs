@@ -10,8 +10,9 @@ use crate::channel::Channel;
 use crate::diagnosis::select::Entry;
 use crate::diagnosis::term::Whose;
 use crate::diagnosis::touch::touches;
-use crate::diagnosis::unit::Unit;
+use crate::diagnosis::unit::{Stretch, Unit};
 use crate::findings::Untestable;
+use crate::residual::Omission;
 
 /// What can be tried, and what cannot and why.
 pub(crate) struct Entries {
@@ -21,6 +22,9 @@ pub(crate) struct Entries {
 
 /// Below this, seconds, there are too few blocks of time for a robust variance.
 pub(crate) const SHORT_S: f64 = 20.0;
+
+/// What one row in so many lacks is not worth telling.
+const FEW: usize = 20;
 
 /// For how long a robot can be compared in these units together, seconds.
 pub(crate) fn lasting_s(units: &[&Unit<'_>], robot: RobotId) -> f64 {
@@ -92,20 +96,25 @@ fn obstacle(effect: Effect, unit: &Unit<'_>) -> Option<String> {
                 .to_owned(),
         );
     }
+    if effect == Effect::PartnerInfluence && unit.evidence.is_of_one() {
+        return Some("no other robot was recorded".to_owned());
+    }
     let shows = |channel: &Channel| touches(effect, *channel) && unit.stretch(*channel).is_some();
     if Channel::ALL.iter().any(shows) {
         return None;
     }
-    let reasons = omissions(effect, unit);
+    let reasons = omissions(effect, unit, &|_, _| true);
     let nothing = || "nothing to compare it with was recorded".to_owned();
     Some(if reasons.is_empty() { nothing() } else { reasons.join("; ") })
 }
 
-/// What is missing in the channels of an effect.
-fn omissions(effect: Effect, unit: &Unit<'_>) -> Vec<String> {
+/// What is missing in the channels of an effect, of what is `worth` telling.
+fn omissions(effect: Effect, unit: &Unit<'_>, worth: &dyn Fn(&Omission, &Stretch) -> bool) -> Vec<String> {
     let own = unit.stretches.iter().filter(|stretch| touches(effect, stretch.channel));
-    let reasons: BTreeSet<String> =
-        own.flat_map(|stretch| &stretch.omissions).map(ToString::to_string).collect();
+    let reasons: BTreeSet<String> = own
+        .flat_map(|stretch| stretch.omissions.iter().filter(|own| worth(own, stretch)))
+        .map(ToString::to_string)
+        .collect();
     reasons.into_iter().collect()
 }
 
@@ -116,7 +125,9 @@ pub(crate) fn unseen(units: &[&Unit<'_>], (effect, whose): Entry) -> Untestable 
         Whose::Everyone => (None, units.first()),
     };
     let mut why = "it would change nothing of what can be compared".to_owned();
-    let reasons = unit.map_or_else(Vec::new, |unit| omissions(effect, unit));
+    let reasons = unit.map_or_else(Vec::new, |unit| {
+        omissions(effect, unit, &|own, stretch| own.matters(stretch.rows / FEW))
+    });
     if !reasons.is_empty() {
         why = format!("{why} ({})", reasons.join("; "));
     }

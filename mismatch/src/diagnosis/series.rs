@@ -32,7 +32,7 @@ pub(crate) fn plots(
                     time_s: indices().map(|index| unit.rows[index].time_s).collect(),
                     nominal: indices().map(|index| nominal[index]).collect(),
                     corrected: indices().map(|index| corrected[index]).collect(),
-                    sigma: state.noise.scales[stretch.first_scale + component],
+                    sigma: root_mean_square(indices().map(|index| state.noise.sigma[index])),
                     position_m: indices()
                         .map(|index| unit.rows[index].regime.pose.map(|pose| pose.position()))
                         .collect(),
@@ -61,6 +61,12 @@ pub(crate) fn plots(
         }
     }
     plots
+}
+
+/// Of a series whose noise changes with the driving: so that noise alone has the size of one sigma.
+fn root_mean_square(sigmas: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = sigmas.fold((0.0, 0_usize), |(sum, count), sigma| (sum + sigma * sigma, count + 1));
+    (sum / count.max(1) as f64).sqrt()
 }
 
 /// The partial residuals of a finding in the channel that shows it most, component by component.

@@ -21,6 +21,8 @@ const THRESHOLDS: usize = 24;
 /// A change of command takes at least this long to follow, seconds: what bounds an acceleration limit that
 /// can act.
 const SHORTEST_STEP_S: f64 = 0.02;
+/// And so long at the most: what takes longer is no answer to a command.
+const LONGEST_STEP_S: f64 = 2.0;
 /// Beyond every place and before every time.
 const EVERYWHERE: f64 = 1e9;
 /// Values of a delay or lag that are tried, seconds.
@@ -236,8 +238,13 @@ pub(crate) fn thresholds(parameter: &Parameter, units: &[&Unit<'_>]) -> Vec<f64>
         })
         .fold(0.0, f64::max);
     let greatest = parameter.plausible.1.min(demand);
-    // A limit far below what is asked for would stop the robot; a threshold may be small.
-    let range = if parameter.off.is_finite() { 60.0 } else { 8.0 };
+    // A limit of speed far below what is asked for would stop the robot; a threshold may be small, and with a
+    // small acceleration a robot gets there later.
+    let range = match parameter.unit {
+        "m/s^2" => LONGEST_STEP_S / SHORTEST_STEP_S,
+        _ if parameter.off.is_finite() => 60.0,
+        _ => 8.0,
+    };
     let least = parameter.plausible.0.max(greatest / range);
     if greatest.partial_cmp(&least) != Some(std::cmp::Ordering::Greater) {
         return Vec::new();

@@ -25,8 +25,6 @@ pub(crate) struct Stretch {
     pub(crate) offset: usize,
     pub(crate) rows: usize,
     pub(crate) components: usize,
-    /// The number of the channel's first scale among those of the unit.
-    pub(crate) first_scale: usize,
     pub(crate) omissions: Vec<Omission>,
 }
 
@@ -165,7 +163,6 @@ impl<'a> Unit<'a> {
                 offset: unit.rows.len(),
                 rows: found.rows.len(),
                 components,
-                first_scale,
                 omissions: found.omissions,
             });
             for row in &found.rows {

@@ -10,13 +10,14 @@
 //! The instants are the stamps of sightings, and those between them where the sensor's period says that it
 //! looked and saw nothing.
 
+use pleiad_physics::chain::sensors::Seen;
 use pleiad_physics::{Effect, RobotModel};
 
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
 use crate::diagnosis::spread::scans::{
-    CHANNELS, Scan, actual, in_view, median_spread, predicted, scans, targets,
+    CHANNELS, Reading, Scan, actual, in_view, median_spread, predicted, scans, targets,
 };
 use crate::diagnosis::unit::Unit;
 use crate::sensors::At;
@@ -28,7 +29,7 @@ const CONSTANT: usize = 0;
 const MARGIN_SIGMAS: f64 = 3.0;
 /// So many instants without any sighting in a row are a sensor that is off.
 const MOST_SILENT: f64 = 25.0;
-/// A reading this many sigmas from a target is of it, whatever name it bears.
+/// A reading this many sigmas from a target is of it, unless it is as near to the one whose name it bears.
 const GATE: f64 = 6.0;
 /// A declared detection probability of one counts as one miss in a thousand, as in the effect.
 const LEAST_MISS_ODDS: f64 = 1e-3;
@@ -150,20 +151,30 @@ fn collect(
     let margins = sigmas.map(|sigma| MARGIN_SIGMAS * sigma);
     for (time_s, scan) in instants(unit, &own) {
         let Some(at) = At::new(unit.evidence, unit.robot, track, time_s) else { continue };
-        for (target, seen) in targets(unit, kind, time_s) {
-            if !in_view(unit, model, &at, &seen, margins) {
+        let targets = targets(unit, kind, time_s);
+        let near = |reading: &Reading<'_>, seen: &Seen| {
+            let (errors, _) = reading.errors(unit, model, seen);
+            errors
+                .iter()
+                .zip(sigmas)
+                .all(|(error, sigma)| error.is_none_or(|error| error.abs() < GATE * sigma))
+        };
+        // Readings that are not where their names are: of another target.
+        let misnamed: Vec<&Reading<'_>> = scan.map_or_else(Vec::new, |scan| {
+            let fits = |reading: &&Reading<'_>| {
+                let named = actual(model, reading);
+                targets.iter().any(|(target, seen)| *target == named && near(reading, seen))
+            };
+            scan.readings.iter().filter(|reading| !fits(reading)).collect()
+        });
+        for (target, seen) in &targets {
+            let (target, seen) = (*target, seen);
+            if !in_view(unit, model, &at, seen, margins) {
                 continue;
             }
-            let predicted = predicted(unit, model, &at, &seen);
-            let reported = scan.is_some_and(|scan| {
-                scan.readings.iter().any(|reading| {
-                    let (errors, _) = reading.errors(unit, model, &seen);
-                    let near = |(error, sigma): (&Option<f64>, f64)| {
-                        error.is_none_or(|error| error.abs() < GATE * sigma)
-                    };
-                    actual(model, reading) == target || errors.iter().zip(sigmas).all(near)
-                })
-            });
+            let predicted = predicted(unit, model, &at, seen);
+            let named = |scan: &Scan<'_>| scan.readings.iter().any(|own| actual(model, own) == target);
+            let reported = scan.is_some_and(named) || misnamed.iter().any(|own| near(own, seen));
             let regressors = [predicted.range_m, predicted.bearing_rad * predicted.bearing_rad];
             rows.push(Row { regressors, missed: !reported });
             places.push(Place { unit: position, time_s, channel: CHANNELS[kind][0] });

@@ -2,9 +2,10 @@
 //!
 //! Found before anything is fitted: what is metres off would drag every other effect with it. The likelihood is
 //! that of the sightings that name either landmark, with the names as they are and exchanged, the penalty of
-//! each sighting bounded; both landmarks must gain. What is found becomes part of the unit's model.
+//! each sighting bounded; both landmarks must gain, or the one that a robot sees if another robot sees both.
+//! What is found becomes part of the unit's model.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_estimation::RobotId;
 use pleiad_estimation::sample::Target;
@@ -31,6 +32,9 @@ const UNDECLARED: [f64; 2] = [0.1, 0.04];
 /// Two names, the smaller first.
 type Pair = (u32, u32);
 
+/// By the name that sightings bear and another: what they gain by the other's place, per unit and block.
+type Gains = BTreeMap<(u32, u32), Vec<Vec<f64>>>;
+
 /// A swap that a robot shows.
 pub(crate) struct Swap {
     robot: RobotId,
@@ -44,8 +48,8 @@ pub(crate) struct Swap {
 pub(crate) struct Swaps {
     found: Vec<Swap>,
     pub(crate) tests: usize,
-    /// Robots that see landmarks.
-    robots: Vec<RobotId>,
+    /// Robots that see landmarks, with the names they see.
+    robots: BTreeMap<RobotId, BTreeSet<u32>>,
 }
 
 /// Finds the swaps of every robot and gives them to its units' models.
@@ -54,19 +58,17 @@ pub(crate) fn swaps(units: &mut [Unit<'_>]) -> Swaps {
     let mut robots: Vec<RobotId> = units.iter().map(|unit| unit.robot).collect();
     robots.sort_unstable();
     robots.dedup();
+    let mut of_robots: BTreeMap<RobotId, Gains> = BTreeMap::new();
     for robot in robots {
         let own: Vec<&Unit<'_>> = units.iter().filter(|unit| unit.robot == robot).collect();
         let gains = gains(&own);
         if gains.is_empty() {
             continue;
         }
-        all.robots.push(robot);
-        let names: Vec<u32> = gains
-            .keys()
-            .map(|(named, _)| *named)
-            .collect::<std::collections::BTreeSet<_>>()
-            .into_iter()
-            .collect();
+        let gains: &Gains = of_robots.entry(robot).or_insert(gains);
+        let seen: BTreeSet<u32> = gains.keys().map(|(named, _)| *named).collect();
+        let names: Vec<u32> = seen.iter().copied().collect();
+        all.robots.insert(robot, seen);
         all.tests += names.len() * names.len().saturating_sub(1) / 2;
         let mut found = Vec::new();
         for (index, &first) in names.iter().enumerate() {
@@ -75,7 +77,6 @@ pub(crate) fn swaps(units: &mut [Unit<'_>]) -> Swaps {
                 else {
                     continue;
                 };
-                let sum = |blocks: &Vec<Vec<f64>>| blocks.iter().flatten().sum::<f64>();
                 if 2.0 * sum(one).min(sum(other)) > LEAST_GAIN {
                     let p = upper_tail(2.0 * (sum(one) + sum(other)), 1);
                     let both: Vec<Vec<f64>> = one
@@ -95,17 +96,47 @@ pub(crate) fn swaps(units: &mut [Unit<'_>]) -> Swaps {
                 continue;
             }
             taken.extend([first, second]);
-            for unit in units.iter_mut().filter(|unit| unit.robot == robot) {
-                unit.nominal.effects.push(effect(swap.pair));
-            }
             all.found.push(swap);
+        }
+    }
+    all.found.extend(halves(&all.found, &of_robots));
+    for swap in &all.found {
+        for unit in units.iter_mut().filter(|unit| unit.robot == swap.robot) {
+            unit.nominal.effects.push(effect(swap.pair));
         }
     }
     all
 }
 
+/// Swaps that a robot shows from one side, because it sees only one of the landmarks: what alone could be any
+/// mistake is the same one where another robot shows both.
+fn halves(found: &[Swap], of_robots: &BTreeMap<RobotId, Gains>) -> Vec<Swap> {
+    let pairs: BTreeSet<Pair> = found.iter().map(|swap| swap.pair).collect();
+    let mut halves: Vec<Swap> = Vec::new();
+    for (&robot, gains) in of_robots {
+        for &(first, second) in &pairs {
+            let mut known = found.iter().chain(&halves).filter(|swap| swap.robot == robot);
+            if known.any(|swap| [swap.pair.0, swap.pair.1].iter().any(|name| [first, second].contains(name)))
+            {
+                continue;
+            }
+            let side = match (gains.get(&(first, second)), gains.get(&(second, first))) {
+                (Some(side), None) | (None, Some(side)) if 2.0 * sum(side) > LEAST_GAIN => side,
+                _ => continue,
+            };
+            let p = upper_tail(2.0 * sum(side), 1);
+            halves.push(Swap { robot, pair: (first, second), p, gain: summed(side) });
+        }
+    }
+    halves
+}
+
+fn sum(blocks: &[Vec<f64>]) -> f64 {
+    blocks.iter().flatten().sum()
+}
+
 impl Swaps {
-    /// A finding per swap: of everyone if every robot that sees landmarks shows it.
+    /// A finding per swap: of everyone if every robot that sees either landmark shows it.
     pub(super) fn terms(&self, tests: usize) -> Vec<SpreadTerm> {
         let mut by_pair: BTreeMap<Pair, Vec<&Swap>> = BTreeMap::new();
         for swap in &self.found {
@@ -113,12 +144,20 @@ impl Swaps {
         }
         let mut terms = Vec::new();
         for (pair, own) in by_pair {
-            if own.len() > 1 && own.len() == self.robots.len() {
+            let either = |names: &&BTreeSet<u32>| names.contains(&pair.0) || names.contains(&pair.1);
+            if own.len() > 1 && own.len() == self.robots.values().filter(either).count() {
                 let total = own.iter().map(|swap| swap.gain.total).sum();
                 let variance: f64 = own.iter().map(|swap| swap.gain.standard_error.powi(2)).sum();
                 let gain = Gain { total, standard_error: variance.sqrt() };
                 let p = own.iter().map(|swap| swap.p).fold(1.0, f64::min);
-                terms.push(term(pair, Whose::Everyone, self.robots.clone(), p, gain, tests));
+                terms.push(term(
+                    pair,
+                    Whose::Everyone,
+                    self.robots.keys().copied().collect(),
+                    p,
+                    gain,
+                    tests,
+                ));
             } else {
                 let one = |swap: &&Swap| {
                     term(pair, Whose::Robot(swap.robot), vec![swap.robot], swap.p, swap.gain, tests)
@@ -161,8 +200,8 @@ fn effect((first, second): Pair) -> ActiveEffect<f64> {
 }
 
 /// What every name gains if its sightings are of another landmark: by named and other, per unit and block.
-fn gains(units: &[&Unit<'_>]) -> BTreeMap<(u32, u32), Vec<Vec<f64>>> {
-    let mut gains: BTreeMap<(u32, u32), Vec<Vec<f64>>> = BTreeMap::new();
+fn gains(units: &[&Unit<'_>]) -> Gains {
+    let mut gains = Gains::new();
     let blank: Vec<Vec<f64>> = units.iter().map(|unit| vec![0.0; unit.blocks + 1]).collect();
     for (position, unit) in units.iter().enumerate() {
         let model = &unit.nominal;

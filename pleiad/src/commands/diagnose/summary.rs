@@ -1,5 +1,6 @@
 //! The findings in a few lines, for a terminal.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -8,8 +9,14 @@ use pleiad_report::quantity;
 
 use super::sentences::{claim_words, robots, title};
 
-/// Untestable effects are counted beyond this many reasons.
-const REASONS: usize = 4;
+/// So many reasons why effects were not tested are told.
+const REASONS: usize = 6;
+/// So many effects are told by their names.
+const NAMES: usize = 6;
+/// So many notes are told.
+const NOTES: usize = 12;
+/// Below this a probability is only called smaller.
+const LEAST_PROBABILITY: f64 = 1e-12;
 
 pub(super) fn text(findings: &Findings, out: &Path) -> String {
     let mut text = format!("{}: {}\n", findings.recordings.join(", "), claim_words(findings.verdict));
@@ -24,22 +31,50 @@ pub(super) fn text(findings: &Findings, out: &Path) -> String {
             let _ = writeln!(text, "robot {}: error per 100 m {before} before, {after} after", own.robot);
         }
     }
-    let mut reasons: Vec<&str> = findings.untestable.iter().map(|own| own.why.as_str()).collect();
-    reasons.sort_unstable();
-    reasons.dedup();
-    for why in reasons.iter().take(REASONS) {
-        let count = findings.untestable.iter().filter(|own| own.why == *why).count();
-        let _ = writeln!(text, "not tested ({count}): {why}");
+    let mut tested: Vec<&str> = findings.undetected.iter().map(|own| own.effect.as_str()).collect();
+    tested.extend(findings.findings.iter().filter_map(|own| own.effect.as_deref()));
+    tested.sort_unstable();
+    tested.dedup();
+    if !tested.is_empty() {
+        let _ = writeln!(
+            text,
+            "tested: {} effects; how large each would have to be is in the report",
+            tested.len()
+        );
     }
-    if reasons.len() > REASONS {
-        let _ = writeln!(text, "not tested: {} more reasons in the report", reasons.len() - REASONS);
-    }
-    for note in &findings.notes {
+    not_tested(findings, &mut text);
+    for note in findings.notes.iter().take(NOTES) {
         let _ = writeln!(text, "note: {note}");
+    }
+    if findings.notes.len() > NOTES {
+        let _ = writeln!(text, "note: {} more in the report", findings.notes.len() - NOTES);
     }
     let _ = writeln!(text, "corrected model: {}/corrected.toml", out.display());
     let _ = writeln!(text, "report: {}/report.html", out.display());
     text
+}
+
+/// The effects that could not be tested, by reason, and whose.
+fn not_tested(findings: &Findings, text: &mut String) {
+    let mut reasons: Vec<&str> = findings.untestable.iter().map(|own| own.why.as_str()).collect();
+    reasons.sort_unstable();
+    reasons.dedup();
+    for why in reasons.iter().take(REASONS) {
+        let own = || findings.untestable.iter().filter(|own| own.why == *why);
+        let names: BTreeSet<&str> = own().map(|own| own.effect.as_str()).collect();
+        let known: BTreeSet<u32> = own().filter_map(|own| own.robot).collect();
+        let known: Vec<u32> = known.into_iter().collect();
+        let what = if names.len() > NAMES {
+            format!("{} effects", names.len())
+        } else {
+            names.into_iter().collect::<Vec<_>>().join(", ")
+        };
+        let whose = if known.is_empty() { String::new() } else { format!(" of {}", robots(&known)) };
+        let _ = writeln!(text, "not tested: {what}{whose}: {why}");
+    }
+    if reasons.len() > REASONS {
+        let _ = writeln!(text, "not tested: {} more reasons in the report", reasons.len() - REASONS);
+    }
 }
 
 fn lines(finding: &Finding) -> String {
@@ -52,8 +87,12 @@ fn lines(finding: &Finding) -> String {
     let _ = write!(text, "\n   {}", finding.summary);
     let held_out = &finding.held_out;
     let (gain, error) = (quantity(held_out.log_score_gain, ""), quantity(held_out.log_score_gain_se, ""));
-    let _ =
-        write!(text, "\n   p {}; held-out log score {gain} ± {error}", quantity(finding.p_familywise, ""));
+    let p = if finding.p_familywise < LEAST_PROBABILITY {
+        format!("below {LEAST_PROBABILITY:e}")
+    } else {
+        quantity(finding.p_familywise, "")
+    };
+    let _ = write!(text, "\n   p {p}; held-out log score {gain} ± {error}");
     if let Some(manoeuvre) = &finding.manoeuvre {
         let _ = write!(text, "\n   drive next: {manoeuvre}");
     }
@@ -81,7 +120,8 @@ mod tests {
    drive next: steps of speed, 30 s
 
 robot 2: error per 100 m 3.00 m before, 0.400 m after
-not tested (1): no steering angle was recorded
+tested: 3 effects; how large each would have to be is in the report
+not tested: steer_trim: no steering angle was recorded
 note: square: ends early
 corrected model: out/corrected.toml
 report: out/report.html

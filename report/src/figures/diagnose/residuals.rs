@@ -10,6 +10,10 @@ use crate::{Axis, Colour, Figure, Panel, Trace};
 
 /// Runs that many residuals are summed up in: about as many as can be told apart in a panel.
 const RUNS: usize = 150;
+/// Sizes over noise that are shown in any case: small differences of clean data look small.
+const SPREADS: (f64, f64) = (0.5, 10.0);
+/// And this factor beyond the smallest and largest.
+const MARGIN: f64 = 1.2;
 
 /// Root mean square of the residuals over their noise, `[nominal, corrected]`.
 fn spread(series: &ResidualColumns) -> [f64; 2] {
@@ -39,6 +43,7 @@ pub(crate) fn spread_figure(residuals: &[ResidualColumns], robots: &[RobotId]) -
         }
     }
     let mut traces = Vec::new();
+    let (mut low, mut high) = SPREADS;
     for (index, robot) in robots.iter().enumerate() {
         let own: Vec<(&ResidualColumns, [f64; 2])> = residuals
             .iter()
@@ -48,6 +53,9 @@ pub(crate) fn spread_figure(residuals: &[ResidualColumns], robots: &[RobotId]) -
             .collect();
         if own.is_empty() {
             continue;
+        }
+        for value in own.iter().flat_map(|(_, spread)| spread) {
+            (low, high) = (low.min(value / MARGIN), high.max(value * MARGIN));
         }
         let name = robot_name(*robot);
         let categories: Vec<String> = own.iter().map(|(series, _)| row(series)).collect();
@@ -60,7 +68,7 @@ pub(crate) fn spread_figure(residuals: &[ResidualColumns], robots: &[RobotId]) -
     if traces.is_empty() {
         return None;
     }
-    let x = Axis::new("root mean square over noise", "-").logarithmic();
+    let x = Axis::new("root mean square over noise", "-").logarithmic().range(low, high);
     let height = u32::try_from(rows.len()).unwrap_or(40).min(40) * 34 + 90;
     Some(Figure::new(x, Axis::list("", &rows)).height(height).traces(traces))
 }

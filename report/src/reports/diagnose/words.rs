@@ -10,6 +10,8 @@ use crate::quantity;
 const LEAST_PROBABILITY: f64 = 1e-12;
 /// The horizon that page one tells, seconds.
 const TOLD_HORIZON_S: f64 = 5.0;
+/// A smaller relative change of an error of prediction is none.
+const UNCHANGED: f64 = 0.005;
 
 impl Claim {
     /// A word or two, for a badge.
@@ -218,6 +220,16 @@ pub(super) fn prediction(roll_outs: &[HorizonError]) -> String {
     let Some(own) = nearest.filter(|own| own.position_m.iter().all(|error| error.is_finite())) else {
         return String::new();
     };
+    // A sensor or a servo changes nothing of where the wheels lead.
+    let [before, _, after] = own.position_m;
+    if (before - after).abs() < UNCHANGED * before {
+        return format!(
+            "Where the wheels lead does not depend on it: after {} s of driving blind the predicted position is off by \
+             {} with and without it.",
+            plain(own.horizon_s),
+            metres(before)
+        );
+    }
     let [nominal, refitted, corrected] = own.position_m.map(metres);
     format!(
         "After {} s of driving blind the predicted position is off by {nominal} (nominal model), {refitted} (its own \
