@@ -39,6 +39,14 @@ monte-carlo:
 effects *arguments:
     cargo run -p pleiad-tests --example effects -- --out docs/benchmarks/effects.md {{ arguments }}
 
+# What the diagnosis names in a hundred recordings without effects: the table of docs/benchmarks/clean.md. Takes an hour.
+clean *arguments:
+    cargo run -p pleiad-tests --example clean -- --out docs/benchmarks/clean.md {{ arguments }}
+
+# Whether every effect of the catalogue is named: the table of docs/benchmarks/naming.md. Takes an hour.
+naming *arguments:
+    cargo run -p pleiad-tests --example naming -- --out docs/benchmarks/naming.md {{ arguments }}
+
 # The documentation of the workspace's own crates, warnings denied.
 docs:
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
