@@ -12,6 +12,7 @@ use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::Unit;
 use crate::diagnosis::white::{White, step};
+use crate::track::median_step;
 
 /// The 95 % quantile of chi-square with one degree of freedom: what twice the log-likelihood may lose.
 const CHI_SQUARE_95: f64 = 3.841_458_820_694_124;
@@ -56,6 +57,11 @@ impl<'u, 'a> Profile<'u, 'a> {
     /// Log-likelihood at a value of a parameter, but for a constant. `None` if the model predicts no finite
     /// numbers there.
     fn at(&self, slot: Slot, value: f64) -> Option<f64> {
+        self.fitted(slot, value).map(|(found, _)| found)
+    }
+
+    /// The same with the term as it is fitted there.
+    fn fitted(&self, slot: Slot, value: f64) -> Option<(f64, Term)> {
         let mut terms = self.fit.terms.clone();
         terms[slot.0].values[slot.1] = value;
         let effect = terms[slot.0].effect;
@@ -74,18 +80,18 @@ impl<'u, 'a> Profile<'u, 'a> {
             }
             let cost: f64 = states.iter().map(cost).sum();
             if slots.is_empty() {
-                return Some(-cost);
+                return Some((-cost, terms.swap_remove(slot.0)));
             }
             let normal = Normal::new(&units, &states, &own, slots.len());
             let change = normal.step(1e-9)?;
             let gained = 0.5 * change.dot(&normal.gradient);
-            if gained < SMALL_GAIN || step == MOST_STEPS {
-                return Some(gained - cost);
-            }
             for (&(term, parameter), change) in slots.iter().zip(change.iter()) {
                 terms[term].values[parameter] += change;
             }
             terms[slot.0].clamp();
+            if gained < SMALL_GAIN || step == MOST_STEPS {
+                return Some((gained - cost, terms.swap_remove(slot.0)));
+            }
         }
         None
     }
@@ -129,7 +135,23 @@ impl<'u, 'a> Profile<'u, 'a> {
         let most = self.at(slot, value)?;
         let low = self.end(slot, value, -least, most, CHI_SQUARE_95)?;
         let high = self.end(slot, value, least, most, CHI_SQUARE_95)?;
-        Some([low, high])
+        let reach = if Placing::of(term.effect.info()).onset == Some(slot.1) { self.step_s() } else { 0.0 };
+        Some([low - reach, high + reach])
+    }
+
+    /// The longest usual step of the encoders, seconds: predictions act in such steps and have no onset within
+    /// one.
+    fn step_s(&self) -> f64 {
+        let tracks = self.units.iter().filter_map(|unit| unit.evidence.tracks.get(&unit.robot));
+        let steps = tracks.map(|track| median_step(track.encoders.iter().map(|sample| sample.time_s)));
+        steps.filter(|step_s| step_s.is_finite()).fold(0.0, f64::max)
+    }
+
+    /// By how much the other parameters of a term move with one that has no derivative, from one end of its
+    /// interval to the other.
+    pub(crate) fn drag(&self, slot: Slot, [low, high]: [f64; 2]) -> Option<Vec<f64>> {
+        let ((_, at_low), (_, at_high)) = (self.fitted(slot, low)?, self.fitted(slot, high)?);
+        Some(at_low.values.iter().zip(&at_high.values).map(|(low, high)| high - low).collect())
     }
 
     /// Where twice the log-likelihood has lost so much on one side.
