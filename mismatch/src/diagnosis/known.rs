@@ -117,10 +117,21 @@ pub fn fit_known(
         if effect == Effect::LandmarkIdentitySwap {
             return swapped.clone();
         }
+        if effect == Effect::CommandJitter && !effects.contains(&Effect::CommandDelay) {
+            // Commands that come at random times come late on average, which moves them between windows.
+            return known(&units, &delayed(&units, &current, robot), effect, robot);
+        }
         known(&units, &current, effect, robot)
     });
-    let of_spread = of_spread.map(|estimated| known_fit(&units, &estimated, &|_| None, &|_, _| None));
+    let of_spread = of_spread.map(|estimated| known_fit(&units, &estimated, None));
     Ok(of_mean.into_iter().chain(of_spread).collect())
+}
+
+/// The same fit with a delay of commands.
+fn delayed(units: &[&Unit<'_>], current: &Fit, robot: RobotId) -> Fit {
+    let term = found(units, current, Effect::CommandDelay, Whose::Robot(robot));
+    let terms: Vec<Term> = current.terms.iter().cloned().chain(term).collect();
+    fit(units, terms, &|_| true, Effort::FULL).unwrap_or_else(|| current.clone())
 }
 
 /// An effect where the likelihood is greatest beside a fit, of all its starts.
@@ -151,20 +162,17 @@ fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
     let profile = Profile::new(units, fit);
     let one = |position: usize| {
         let estimated = Estimated::of(fit, &covariance, position);
-        let interval = |index| profile.interval((position, index));
-        known_fit(units, &estimated, &interval, &|index, ci95| profile.drag((position, index), ci95))
+        known_fit(units, &estimated, Some((&profile, position)))
     };
     (0..fit.terms.len()).map(one).collect()
 }
 
 /// Values and intervals of a term; those that its derivatives do not give come from `profile`. The values that
-/// are fitted at a threshold, an onset or a place are as unsure as `drag` moves them from one end of its
-/// interval to the other, besides.
+/// are fitted at a threshold, an onset or a place are as unsure, besides, as they are dragged along with it.
 fn known_fit(
     units: &[&Unit<'_>],
     estimated: &Estimated,
-    profile: &dyn Fn(usize) -> Option<[f64; 2]>,
-    drag: &dyn Fn(usize, [f64; 2]) -> Option<Vec<f64>>,
+    profile: Option<(&Profile<'_, '_>, usize)>,
 ) -> KnownFit {
     let term = &estimated.term;
     let mut dragged = vec![0.0; term.values.len()];
@@ -180,20 +188,23 @@ fn known_fit(
         };
         if own.interval == Interval::None
             && parameter.fit != How::Choice
-            && let Some(ci95) = profile(index)
+            && let Some((profile, position)) = profile
+            && let Some(bounded) = profile.bounded((position, index))
         {
+            let ci95 = bounded.ci95;
             own.standard_error = Some((ci95[1] - ci95[0]) / (2.0 * Z_95));
             own.ci95 = Some(ci95);
             own.interval = Interval::Profile;
-            for (sum, moved) in dragged.iter_mut().zip(drag(index, ci95).into_iter().flatten()) {
-                *sum += (moved / (2.0 * Z_95)).powi(2);
+            let errors = profile.dragged((position, index), &bounded).into_iter().flatten();
+            for (sum, error) in dragged.iter_mut().zip(errors) {
+                *sum += error * error;
             }
         }
         parameters.push(own);
     }
-    for (own, dragged) in parameters.iter_mut().zip(dragged) {
-        if own.interval == Interval::Sandwich && dragged > 0.0 {
-            let error = own.standard_error.map_or(0.0, |error| error.hypot(dragged.sqrt()));
+    for (own, variance) in parameters.iter_mut().zip(dragged) {
+        if own.interval == Interval::Sandwich && variance > 0.0 {
+            let error = own.standard_error.map_or(0.0, |error| error.hypot(variance.sqrt()));
             own.standard_error = Some(error);
             own.ci95 = Some([own.value - Z_95 * error, own.value + Z_95 * error]);
         }

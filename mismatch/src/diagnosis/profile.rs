@@ -6,6 +6,7 @@
 use pleiad_physics::{Fit as How, Parameter};
 
 use crate::diagnosis::fit::{Effort, Fit, Normal, Slot, State, columns, fit, residuals};
+use crate::diagnosis::naming::Z_95;
 use crate::diagnosis::noise;
 use crate::diagnosis::starts::{Placing, thresholds};
 use crate::diagnosis::term::Term;
@@ -35,6 +36,13 @@ const NEAR_M: f64 = 1.0;
 const HALVINGS: usize = 5;
 /// An end that is farther than so many doublings of the least step is not there.
 const DOUBLINGS: usize = 12;
+
+/// The interval of a parameter without derivative.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bounded {
+    pub(crate) ci95: [f64; 2],
+    within: [f64; 2],
+}
 
 /// The profile about a fit.
 pub(crate) struct Profile<'u, 'a> {
@@ -118,13 +126,18 @@ impl<'u, 'a> Profile<'u, 'a> {
         let ends = self.at(slot, value).and_then(|most| {
             let low = self.end(slot, value, -least, most, SAME)?;
             let high = self.end(slot, value, least, most, SAME)?;
-            Some((low, high))
+            Some((low[1], high[1]))
         });
         ends.map_or(value, |(low, high)| f64::midpoint(low, high))
     }
 
     /// The 95 % interval of a parameter; `None` if the likelihood does not bound it.
     pub(crate) fn interval(&self, slot: Slot) -> Option<[f64; 2]> {
+        self.bounded(slot).map(|found| found.ci95)
+    }
+
+    /// The same, with the last values tried that are within.
+    pub(crate) fn bounded(&self, slot: Slot) -> Option<Bounded> {
         let term = &self.fit.terms[slot.0];
         let parameter = &term.parameters()[slot.1];
         let value = term.values[slot.1];
@@ -136,7 +149,7 @@ impl<'u, 'a> Profile<'u, 'a> {
         let low = self.end(slot, value, -least, most, CHI_SQUARE_95)?;
         let high = self.end(slot, value, least, most, CHI_SQUARE_95)?;
         let reach = if Placing::of(term.effect.info()).onset == Some(slot.1) { self.step_s() } else { 0.0 };
-        Some([low - reach, high + reach])
+        Some(Bounded { ci95: [low[1] - reach, high[1] + reach], within: [low[0], high[0]] })
     }
 
     /// The longest usual step of the encoders, seconds: predictions act in such steps and have no onset within
@@ -147,15 +160,22 @@ impl<'u, 'a> Profile<'u, 'a> {
         steps.filter(|step_s| step_s.is_finite()).fold(0.0, f64::max)
     }
 
-    /// By how much the other parameters of a term move with one that has no derivative, from one end of its
-    /// interval to the other.
-    pub(crate) fn drag(&self, slot: Slot, [low, high]: [f64; 2]) -> Option<Vec<f64>> {
-        let ((_, at_low), (_, at_high)) = (self.fitted(slot, low)?, self.fitted(slot, high)?);
-        Some(at_low.values.iter().zip(&at_high.values).map(|(low, high)| high - low).collect())
+    /// How unsure the other parameters of a term are because one without derivative is: half of what they move
+    /// over its interval, over 1.96. Beyond its ends they may be anything.
+    pub(crate) fn dragged(&self, slot: Slot, bounded: &Bounded) -> Option<Vec<f64>> {
+        let [from, to] = bounded.within;
+        let share = (bounded.ci95[1] - bounded.ci95[0]) / (to - from);
+        if !share.is_finite() {
+            return None;
+        }
+        let ((_, at_low), (_, at_high)) = (self.fitted(slot, from)?, self.fitted(slot, to)?);
+        let error = |(low, high): (&f64, &f64)| share * (high - low) / (2.0 * Z_95);
+        Some(at_low.values.iter().zip(&at_high.values).map(error).collect())
     }
 
-    /// Where twice the log-likelihood has lost so much on one side.
-    fn end(&self, slot: Slot, value: f64, least: f64, most: f64, loss: f64) -> Option<f64> {
+    /// Where twice the log-likelihood has lost so much on one side: the last value tried that is within, and the
+    /// first that is not.
+    fn end(&self, slot: Slot, value: f64, least: f64, most: f64, loss: f64) -> Option<[f64; 2]> {
         let inside = |there: f64| {
             self.at(slot, there).is_some_and(|found| 2.0 * (most - found) / self.inflation < loss)
         };
@@ -177,7 +197,7 @@ impl<'u, 'a> Profile<'u, 'a> {
                 far = middle;
             }
         }
-        Some(value + far)
+        Some([value + near, value + far])
     }
 }
 
