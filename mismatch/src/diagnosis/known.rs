@@ -117,21 +117,10 @@ pub fn fit_known(
         if effect == Effect::LandmarkIdentitySwap {
             return swapped.clone();
         }
-        if effect == Effect::CommandJitter && !effects.contains(&Effect::CommandDelay) {
-            // Commands that come at random times come late on average, which moves them between windows.
-            return known(&units, &delayed(&units, &current, robot), effect, robot);
-        }
         known(&units, &current, effect, robot)
     });
     let of_spread = of_spread.map(|estimated| known_fit(&units, &estimated, None));
     Ok(of_mean.into_iter().chain(of_spread).collect())
-}
-
-/// The same fit with a delay of commands.
-fn delayed(units: &[&Unit<'_>], current: &Fit, robot: RobotId) -> Fit {
-    let term = found(units, current, Effect::CommandDelay, Whose::Robot(robot));
-    let terms: Vec<Term> = current.terms.iter().cloned().chain(term).collect();
-    fit(units, terms, &|_| true, Effort::FULL).unwrap_or_else(|| current.clone())
 }
 
 /// An effect where the likelihood is greatest beside a fit, of all its starts.

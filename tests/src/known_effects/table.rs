@@ -2,8 +2,6 @@
 
 use std::fmt::Write;
 
-use pleiad_mismatch::Interval;
-
 use super::outcome::{Outcome, Row, mean};
 
 /// The table, effect by effect and parameter by parameter, and below it what all intervals together cover.
@@ -51,7 +49,7 @@ fn cells(row: &Row) -> String {
         return format!("{name} | {} | value only | | | |", row.truth);
     }
     let (sigma, bias) = (row.sigma(), row.bias());
-    let kind = if row.interval == Interval::Profile { " (profile)" } else { "" };
+    let kind = if row.profile { " (profile)" } else { "" };
     let squares = mean(row.z_squares().into_iter());
     format!(
         "{name} | {} | {sigma:.2e}{kind} | {:.3} | {:.2} | {squares:.2} | {}/{count}",
