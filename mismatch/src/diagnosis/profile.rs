@@ -76,15 +76,15 @@ impl<'u, 'a> Profile<'u, 'a> {
         let slots: Vec<Slot> = self.fit.slots.iter().copied().filter(|own| own.0 == slot.0).collect();
         let concerned: Vec<usize> = (0..self.units.len()).filter(|&unit| self.concerns(slot, unit)).collect();
         let units: Vec<&Unit<'_>> = concerned.iter().map(|&unit| self.units[unit]).collect();
+        // Amplitudes are nearly linear: their columns serve every step.
+        let own: Vec<_> = units.iter().map(|unit| columns(unit, &terms, &slots)).collect();
         for step in 1.. {
             let mut states: Vec<State> = Vec::with_capacity(units.len());
-            let mut own = Vec::with_capacity(units.len());
             for (&unit, &position) in units.iter().zip(&concerned) {
                 let known = &self.fit.states[position];
                 let residuals =
                     residuals(unit, &terms, &|channel| touches(effect, channel), Some(&known.residuals))?;
                 states.push(State { residuals, noise: known.noise.clone() });
-                own.push(columns(unit, &terms, &slots));
             }
             let cost: f64 = states.iter().map(cost).sum();
             if slots.is_empty() {
