@@ -103,12 +103,7 @@ pub(crate) fn plan_of_length(evidence: &Evidence<'_>, robot: RobotId, length_s: 
 }
 
 /// The nearest other robot, sample by sample.
-fn partner(
-    evidence: &Evidence<'_>,
-    robot: RobotId,
-    track: &Track,
-    window: &Window,
-) -> Vec<Option<[f64; 2]>> {
+fn partner(evidence: &Evidence<'_>, robot: RobotId, track: &Track, window: &Window) -> Vec<Option<[f64; 2]>> {
     if evidence.tracks.len() < 2 {
         return Vec::new();
     }

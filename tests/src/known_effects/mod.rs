@@ -4,8 +4,10 @@
 #![allow(clippy::expect_used, clippy::missing_panics_doc, reason = "helpers of tests fail by panicking")]
 
 mod cases;
+mod exceptions;
 mod outcome;
 mod table;
+mod wishes;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -14,8 +16,10 @@ use pleiad_mismatch::{KnownFit, fit_known};
 use pleiad_sim_peers::simulate;
 
 pub use cases::{Case, ROBOT, cases, cases_of};
+pub use exceptions::{EXCEPTIONS, Exception};
 pub use outcome::{Outcome, Row};
 pub use table::{rows, table};
+pub use wishes::{COVERED, Shortfall, Wish, covered, shortfalls};
 
 /// Seeds of the recordings of every effect.
 pub const SEEDS: std::ops::RangeInclusive<u64> = 1..=20;

@@ -55,7 +55,11 @@ impl Outcome {
         let fits: Vec<KnownFit> = fits.into_iter().flatten().collect();
         let parameters = case.effect.info().parameters.iter().zip(&case.values).enumerate();
         let rows = parameters
-            .filter(|(_, (parameter, truth))| !has_size(parameter.fit) || **truth != parameter.off)
+            .filter(|(_, (parameter, truth))| {
+                // A shape is there whether or not it has its usual value; a size that is off was not injected.
+                let is_shape = parameter.off != 0.0 && parameter.off.is_finite();
+                !has_size(parameter.fit) || **truth != parameter.off || is_shape
+            })
             .map(|(index, (parameter, truth))| Row::new(parameter, *truth, index, &fits))
             .collect();
         Self { effect: case.effect, rows, seeds, found: fits.len() }
