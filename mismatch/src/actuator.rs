@@ -19,10 +19,10 @@ const WINDOW_S: f64 = 0.2;
 /// After this long a servo has forgotten how it stood at the first command, seconds.
 pub(crate) const SETTLING_S: f64 = 0.6;
 /// In a part of a window the robot turns no more than this, radians: loads that depend on the heading are
-/// right to a thousandth.
-const MOST_TURN_RAD: f64 = 0.1;
+/// right to `0.05^2/24`, a ten-thousandth.
+const MOST_TURN_RAD: f64 = 0.05;
 /// A window has no more parts.
-const MOST_PARTS: f64 = 8.0;
+const MOST_PARTS: f64 = 16.0;
 
 /// A window of the wheels.
 pub(crate) struct Turning {

@@ -85,18 +85,6 @@ impl<'a> Evidence<'a> {
         Some((self.tracks.get(&robot)?, self.plans.get(&robot)?))
     }
 
-    /// Where the robot that is nearest at the middle one of three instants is at all of them.
-    pub(crate) fn partner(&self, robot: RobotId, times_s: [f64; 3], own: [f64; 2]) -> Option<[[f64; 2]; 3]> {
-        let places = |track: &Track| -> Option<[[f64; 2]; 3]> {
-            let [first, middle, last] = times_s.map(|time_s| track.truth_at(time_s));
-            Some([first?, middle?, last?].map(|pose| pose.position()))
-        };
-        let others = self.tracks.iter().filter(|(other, _)| **other != robot);
-        others
-            .filter_map(|(_, track)| places(track))
-            .min_by(|a, b| squared_distance(a[1], own).total_cmp(&squared_distance(b[1], own)))
-    }
-
     /// The nearest other robot whose truth is known. Steering and voltage are not recorded.
     pub(crate) fn surroundings(&self, robot: RobotId, time_s: f64, place: Option<[f64; 2]>) -> Surroundings {
         let others = self.tracks.iter().filter(|(other, _)| **other != robot);

@@ -113,6 +113,13 @@ pub struct MapMotion<S> {
     pub yaw_rad: S,
 }
 
+impl<S: Scalar> MapMotion<S> {
+    /// A share of it.
+    pub(crate) fn share(&self, share: S) -> Self {
+        Self { shift_m: self.shift_m.map(|shift_m| shift_m * share), yaw_rad: self.yaw_rad * share }
+    }
+}
+
 /// A reading of wheel angles.
 #[derive(Clone, Copy, Debug)]
 pub struct EncoderReading<S> {

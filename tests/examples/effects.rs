@@ -1,11 +1,14 @@
 //! Writes the table of `docs/benchmarks/effects.md`:
-//! `cargo run -p pleiad-tests --example effects -- [--seeds N] [--out PAGE] [EFFECT...]`.
+//! `cargo run -p pleiad-tests --example effects -- [--seeds N] [--out PAGE] [--keep FOLDER] [EFFECT...]`.
+//!
+//! With a folder, every case that is done is kept there, and one that was kept is not run again.
 
 use std::io::Write as _;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use pleiad_physics::Effect;
-use pleiad_tests::known_effects::{Case, SEEDS, cases, cases_of, rows, run, table};
+use pleiad_tests::known_effects::{Case, Outcome, SEEDS, cases, cases_of, rows, run, table};
 
 /// What the table stands between.
 const MARKS: [&str; 2] = ["<!-- table -->", "<!-- end -->"];
@@ -33,6 +36,7 @@ fn replace(file: &str, table: &str) -> Result<(), String> {
 fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
     let mut seeds: Vec<u64> = SEEDS.collect();
     let mut out = None;
+    let mut keep = None;
     let mut chosen: Vec<Case> = Vec::new();
     while let Some(argument) = arguments.next() {
         let mut value = |what: &str| arguments.next().ok_or_else(|| format!("{argument} needs {what}"));
@@ -43,6 +47,7 @@ fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
                 seeds = (1..=count).collect();
             }
             "--out" => out = Some(value("a page")?),
+            "--keep" => keep = Some(PathBuf::from(value("a folder")?)),
             name => {
                 let effect = Effect::from_name(name)
                     .ok_or_else(|| format!("no effect `{name}`; see pleiad effects"))?;
@@ -55,13 +60,33 @@ fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
     }
     let begun = std::time::Instant::now();
     let mut progress = std::io::stderr();
-    let outcomes = run(&chosen, &seeds, |outcome| {
+    let mut outcomes = Vec::new();
+    for case in &chosen {
+        let outcome = kept_or_run(case, &seeds, keep.as_deref())?;
         let passed_s = begun.elapsed().as_secs_f64();
-        let _ = write!(progress, "{passed_s:.0} s\n{}", rows(outcome));
-    });
+        let _ = write!(progress, "{passed_s:.0} s\n{}", rows(&outcome));
+        outcomes.push(outcome);
+    }
     let text = table(&outcomes);
     match out {
         Some(file) => replace(&file, &text),
         None => write!(std::io::stdout(), "{text}").map_err(|error| error.to_string()),
     }
+}
+
+/// The outcome of a case: from the folder if it is there, and else put there.
+fn kept_or_run(case: &Case, seeds: &[u64], folder: Option<&Path>) -> Result<Outcome, String> {
+    let Some(folder) = folder else { return Ok(run(case, seeds)) };
+    let values: Vec<String> = case.values.iter().map(f64::to_string).collect();
+    let file = folder.join(format!("{}_{}_{}.json", case.effect.name(), values.join("_"), seeds.len()));
+    let place = file.display();
+    if file.exists() {
+        let text = std::fs::read_to_string(&file).map_err(|error| format!("{place}: {error}"))?;
+        let kept = serde_json::from_str(&text).map_err(|error| format!("{place}: {error}"))?;
+        return Outcome::from_json(&kept).ok_or_else(|| format!("{place}: no outcome; remove it"));
+    }
+    let outcome = run(case, seeds);
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    std::fs::write(&file, outcome.to_json().to_string()).map_err(|error| format!("{place}: {error}"))?;
+    Ok(outcome)
 }

@@ -123,7 +123,7 @@ pub fn fit_known(
         }
         known(&units, &current, effect, robot)
     });
-    let of_spread = of_spread.map(|estimated| known_fit(&units, &estimated, &|_| None));
+    let of_spread = of_spread.map(|estimated| known_fit(&units, &estimated, None));
     Ok(of_mean.into_iter().chain(of_spread).collect())
 }
 
@@ -156,7 +156,7 @@ fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
     let groups = groups(units, &fit.terms);
     let one = |position: usize| {
         let estimated = Estimated::of(fit, &covariance, position);
-        let mut own = known_fit(units, &estimated, &|index| profile.interval((position, index)));
+        let mut own = known_fit(units, &estimated, Some((&profile, position)));
         own.total =
             groups.iter().filter(|group| group.len() > 1 && group.contains(&position)).find_map(|group| {
                 let (label, Estimate { value, ci95, .. }) = total(units, (fit, &covariance, group))?;
@@ -174,40 +174,52 @@ fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
     (0..fit.terms.len()).map(one).collect()
 }
 
-/// Values and intervals of a term; those that its derivatives do not give come from `profile`.
+/// Values and intervals of a term; those that its derivatives do not give come from `profile`. The values that
+/// are fitted at a threshold, an onset or a place are as unsure, besides, as they are dragged along with it.
 fn known_fit(
     units: &[&Unit<'_>],
     estimated: &Estimated,
-    profile: &dyn Fn(usize) -> Option<[f64; 2]>,
+    profile: Option<(&Profile<'_, '_>, usize)>,
 ) -> KnownFit {
     let term = &estimated.term;
-    let parameter = |index: usize| {
-        let parameter = &term.parameters()[index];
+    let mut dragged = vec![0.0; term.values.len()];
+    let mut parameters = Vec::with_capacity(term.values.len());
+    for (index, parameter) in term.parameters().iter().enumerate() {
         let mut own = KnownParameter {
             label: parameter.label(),
             unit: parameter.unit,
             value: term.values[index],
-            standard_error: None,
-            ci95: None,
-            interval: Interval::None,
+            standard_error: estimated.errors[index],
+            ci95: estimated.interval(index),
+            interval: if estimated.errors[index].is_some() { Interval::Sandwich } else { Interval::None },
         };
-        if let Some(error) = estimated.errors[index] {
-            own.standard_error = Some(error);
-            own.ci95 = estimated.interval(index);
-            own.interval = Interval::Sandwich;
-        } else if parameter.fit != How::Choice
-            && let Some(ci95) = profile(index)
+        if own.interval == Interval::None
+            && parameter.fit != How::Choice
+            && let Some((profile, position)) = profile
+            && let Some(bounded) = profile.bounded((position, index))
         {
+            let ci95 = bounded.ci95;
             own.standard_error = Some((ci95[1] - ci95[0]) / (2.0 * Z_95));
             own.ci95 = Some(ci95);
             own.interval = Interval::Profile;
+            let errors = profile.dragged((position, index), &bounded).into_iter().flatten();
+            for (sum, error) in dragged.iter_mut().zip(errors) {
+                *sum += error * error;
+            }
         }
-        own
-    };
+        parameters.push(own);
+    }
+    for (own, variance) in parameters.iter_mut().zip(dragged) {
+        if own.interval == Interval::Sandwich && variance > 0.0 {
+            let error = own.standard_error.map_or(0.0, |error| error.hypot(variance.sqrt()));
+            own.standard_error = Some(error);
+            own.ci95 = Some([own.value - Z_95 * error, own.value + Z_95 * error]);
+        }
+    }
     KnownFit {
         effect: term.effect,
         robots: units.iter().map(|unit| unit.robot).filter(|&robot| term.acts_on(robot)).collect(),
-        parameters: (0..term.values.len()).map(parameter).collect(),
+        parameters,
         total: None,
     }
 }

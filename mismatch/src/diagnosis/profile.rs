@@ -6,12 +6,14 @@
 use pleiad_physics::{Fit as How, Parameter};
 
 use crate::diagnosis::fit::{Effort, Fit, Normal, Slot, State, columns, fit, residuals};
+use crate::diagnosis::naming::Z_95;
 use crate::diagnosis::noise;
 use crate::diagnosis::starts::{Placing, thresholds};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::Unit;
 use crate::diagnosis::white::{White, step};
+use crate::track::median_step;
 
 /// The 95 % quantile of chi-square with one degree of freedom: what twice the log-likelihood may lose.
 const CHI_SQUARE_95: f64 = 3.841_458_820_694_124;
@@ -35,6 +37,13 @@ const HALVINGS: usize = 5;
 /// An end that is farther than so many doublings of the least step is not there.
 const DOUBLINGS: usize = 12;
 
+/// The interval of a parameter without derivative.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bounded {
+    pub(crate) ci95: [f64; 2],
+    within: [f64; 2],
+}
+
 /// The profile about a fit.
 pub(crate) struct Profile<'u, 'a> {
     units: &'u [&'u Unit<'a>],
@@ -56,36 +65,41 @@ impl<'u, 'a> Profile<'u, 'a> {
     /// Log-likelihood at a value of a parameter, but for a constant. `None` if the model predicts no finite
     /// numbers there.
     fn at(&self, slot: Slot, value: f64) -> Option<f64> {
+        self.fitted(slot, value).map(|(found, _)| found)
+    }
+
+    /// The same with the term as it is fitted there.
+    fn fitted(&self, slot: Slot, value: f64) -> Option<(f64, Term)> {
         let mut terms = self.fit.terms.clone();
         terms[slot.0].values[slot.1] = value;
         let effect = terms[slot.0].effect;
         let slots: Vec<Slot> = self.fit.slots.iter().copied().filter(|own| own.0 == slot.0).collect();
         let concerned: Vec<usize> = (0..self.units.len()).filter(|&unit| self.concerns(slot, unit)).collect();
         let units: Vec<&Unit<'_>> = concerned.iter().map(|&unit| self.units[unit]).collect();
+        // Amplitudes are nearly linear: their columns serve every step.
+        let own: Vec<_> = units.iter().map(|unit| columns(unit, &terms, &slots)).collect();
         for step in 1.. {
             let mut states: Vec<State> = Vec::with_capacity(units.len());
-            let mut own = Vec::with_capacity(units.len());
             for (&unit, &position) in units.iter().zip(&concerned) {
                 let known = &self.fit.states[position];
                 let residuals =
                     residuals(unit, &terms, &|channel| touches(effect, channel), Some(&known.residuals))?;
                 states.push(State { residuals, noise: known.noise.clone() });
-                own.push(columns(unit, &terms, &slots));
             }
             let cost: f64 = states.iter().map(cost).sum();
             if slots.is_empty() {
-                return Some(-cost);
+                return Some((-cost, terms.swap_remove(slot.0)));
             }
             let normal = Normal::new(&units, &states, &own, slots.len());
             let change = normal.step(1e-9)?;
             let gained = 0.5 * change.dot(&normal.gradient);
-            if gained < SMALL_GAIN || step == MOST_STEPS {
-                return Some(gained - cost);
-            }
             for (&(term, parameter), change) in slots.iter().zip(change.iter()) {
                 terms[term].values[parameter] += change;
             }
             terms[slot.0].clamp();
+            if gained < SMALL_GAIN || step == MOST_STEPS {
+                return Some((gained - cost, terms.swap_remove(slot.0)));
+            }
         }
         None
     }
@@ -112,13 +126,18 @@ impl<'u, 'a> Profile<'u, 'a> {
         let ends = self.at(slot, value).and_then(|most| {
             let low = self.end(slot, value, -least, most, SAME)?;
             let high = self.end(slot, value, least, most, SAME)?;
-            Some((low, high))
+            Some((low[1], high[1]))
         });
         ends.map_or(value, |(low, high)| f64::midpoint(low, high))
     }
 
     /// The 95 % interval of a parameter; `None` if the likelihood does not bound it.
     pub(crate) fn interval(&self, slot: Slot) -> Option<[f64; 2]> {
+        self.bounded(slot).map(|found| found.ci95)
+    }
+
+    /// The same, with the last values tried that are within.
+    pub(crate) fn bounded(&self, slot: Slot) -> Option<Bounded> {
         let term = &self.fit.terms[slot.0];
         let parameter = &term.parameters()[slot.1];
         let value = term.values[slot.1];
@@ -129,11 +148,34 @@ impl<'u, 'a> Profile<'u, 'a> {
         let most = self.at(slot, value)?;
         let low = self.end(slot, value, -least, most, CHI_SQUARE_95)?;
         let high = self.end(slot, value, least, most, CHI_SQUARE_95)?;
-        Some([low, high])
+        let reach = if Placing::of(term.effect.info()).onset == Some(slot.1) { self.step_s() } else { 0.0 };
+        Some(Bounded { ci95: [low[1] - reach, high[1] + reach], within: [low[0], high[0]] })
     }
 
-    /// Where twice the log-likelihood has lost so much on one side.
-    fn end(&self, slot: Slot, value: f64, least: f64, most: f64, loss: f64) -> Option<f64> {
+    /// The longest usual step of the encoders, seconds: predictions act in such steps and have no onset within
+    /// one.
+    fn step_s(&self) -> f64 {
+        let tracks = self.units.iter().filter_map(|unit| unit.evidence.tracks.get(&unit.robot));
+        let steps = tracks.map(|track| median_step(track.encoders.iter().map(|sample| sample.time_s)));
+        steps.filter(|step_s| step_s.is_finite()).fold(0.0, f64::max)
+    }
+
+    /// How unsure the other parameters of a term are because one without derivative is: half of what they move
+    /// over its interval, over 1.96. Beyond its ends they may be anything.
+    pub(crate) fn dragged(&self, slot: Slot, bounded: &Bounded) -> Option<Vec<f64>> {
+        let [from, to] = bounded.within;
+        let share = (bounded.ci95[1] - bounded.ci95[0]) / (to - from);
+        if !share.is_finite() {
+            return None;
+        }
+        let ((_, at_low), (_, at_high)) = (self.fitted(slot, from)?, self.fitted(slot, to)?);
+        let error = |(low, high): (&f64, &f64)| share * (high - low) / (2.0 * Z_95);
+        Some(at_low.values.iter().zip(&at_high.values).map(error).collect())
+    }
+
+    /// Where twice the log-likelihood has lost so much on one side: the last value tried that is within, and the
+    /// first that is not.
+    fn end(&self, slot: Slot, value: f64, least: f64, most: f64, loss: f64) -> Option<[f64; 2]> {
         let inside = |there: f64| {
             self.at(slot, there).is_some_and(|found| 2.0 * (most - found) / self.inflation < loss)
         };
@@ -155,7 +197,7 @@ impl<'u, 'a> Profile<'u, 'a> {
                 far = middle;
             }
         }
-        Some(value + far)
+        Some([value + near, value + far])
     }
 }
 

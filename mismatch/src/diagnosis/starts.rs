@@ -16,8 +16,9 @@ use crate::diagnosis::unit::Unit;
 const ONSETS: usize = 24;
 /// Cells per side of the map in which a place is searched, coarse and fine.
 const CELLS: [usize; 3] = [2, 4, 7];
-/// Values of a threshold that are tried.
+/// Values of a threshold that are tried, and the ratio of the greatest and the least.
 const THRESHOLDS: usize = 24;
+const THRESHOLD_RANGE: f64 = 60.0;
 /// A change of command takes at least this long to follow, seconds: what bounds an acceleration limit that
 /// can act.
 const SHORTEST_STEP_S: f64 = 0.02;
@@ -226,7 +227,7 @@ fn integers(least: f64, greatest: f64) -> Vec<f64> {
 }
 
 /// Evenly spaced logarithms over what is plausible and could act: a limit cannot act above all that the
-/// wheels are asked for, a threshold not above it either.
+/// wheels are asked for, a threshold not above it either, and both may be far below.
 pub(crate) fn thresholds(parameter: &Parameter, units: &[&Unit<'_>]) -> Vec<f64> {
     let demand = units
         .iter()
@@ -238,13 +239,8 @@ pub(crate) fn thresholds(parameter: &Parameter, units: &[&Unit<'_>]) -> Vec<f64>
         })
         .fold(0.0, f64::max);
     let greatest = parameter.plausible.1.min(demand);
-    // A limit of speed far below what is asked for would stop the robot; a threshold may be small, and with a
-    // small acceleration a robot gets there later.
-    let range = match parameter.unit {
-        "m/s^2" => LONGEST_STEP_S / SHORTEST_STEP_S,
-        _ if parameter.off.is_finite() => 60.0,
-        _ => 8.0,
-    };
+    // With a small acceleration a robot gets there later.
+    let range = if parameter.unit == "m/s^2" { LONGEST_STEP_S / SHORTEST_STEP_S } else { THRESHOLD_RANGE };
     let least = parameter.plausible.0.max(greatest / range);
     if greatest.partial_cmp(&least) != Some(std::cmp::Ordering::Greater) {
         return Vec::new();

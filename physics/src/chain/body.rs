@@ -42,23 +42,41 @@ pub struct BodyIncrement<S> {
 impl<S: Scalar> BodyIncrement<S> {
     /// The pose at the end of a step that began at `start`.
     pub fn applied_to(&self, start: &Pose<S>) -> Pose<S> {
-        self.share_applied_to(start, self.driven, S::one())
+        driven_from(start, self.driven, &self.added)
     }
+}
 
-    /// The pose after a share of the step, in which this is driven of it; before the step that ended at
-    /// `start`, if the share is negative.
-    pub fn share_applied_to(
-        &self,
-        start: &Pose<S>,
-        [forward_m, left_m, yaw_rad]: [S; 3],
-        share: S,
-    ) -> Pose<S> {
-        let mut pose = start.compose(&Pose::exp(forward_m, left_m, yaw_rad));
-        pose.x_m += self.added.shift_m[0] * share;
-        pose.y_m += self.added.shift_m[1] * share;
-        pose.yaw_rad += self.added.yaw_rad * share;
-        pose
-    }
+/// The pose after this was driven, in the frame of the body, and added, in the map.
+pub(crate) fn driven_from<S: Scalar>(
+    start: &Pose<S>,
+    [forward_m, left_m, yaw_rad]: [S; 3],
+    added: &MapMotion<S>,
+) -> Pose<S> {
+    let mut pose = start.compose(&Pose::exp(forward_m, left_m, yaw_rad));
+    pose.x_m += added.shift_m[0];
+    pose.y_m += added.shift_m[1];
+    pose.yaw_rad += added.yaw_rad;
+    pose
+}
+
+/// The pose before this was driven and added: the inverse of [`driven_from`].
+pub(crate) fn driven_to<S: Scalar>(
+    end: &Pose<S>,
+    [forward_m, left_m, yaw_rad]: [S; 3],
+    added: &MapMotion<S>,
+) -> Pose<S> {
+    let mut pose = *end;
+    pose.x_m -= added.shift_m[0];
+    pose.y_m -= added.shift_m[1];
+    pose.yaw_rad -= added.yaw_rad;
+    pose.compose(&Pose::exp(-forward_m, -left_m, -yaw_rad))
+}
+
+/// What the surroundings add in the context's step.
+pub(crate) fn added<S: Scalar>(model: &RobotModel<S>, context: &Context<S>) -> MapMotion<S> {
+    let mut added = MapMotion { shift_m: [S::zero(); 2], yaw_rad: S::zero() };
+    model.apply(context, |effect, values| effect.world(values, context, &mut added));
+    added
 }
 
 /// The outcome of a step of the body.
@@ -122,9 +140,7 @@ pub fn increment<S: Scalar>(
     if let Some(since) = &mut state.castor.since_reversal_m {
         *since += forward_m.abs();
     }
-    let mut added = MapMotion { shift_m: [S::zero(); 2], yaw_rad: S::zero() };
-    model.apply(&context, |effect, values| effect.world(values, &context, &mut added));
-
+    let added = added(model, &context);
     state.speed_m_s = Some(speed);
     BodyIncrement {
         driven: [body.forward_m, body.left_m, body.yaw_rad],

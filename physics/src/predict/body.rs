@@ -3,7 +3,9 @@
 use std::f64::consts::PI;
 
 use crate::chain::actuator::{Scheduled, turn};
-use crate::chain::body::{BodyIncrement, BodyState, advance, increment, nominal_motion};
+use crate::chain::body::{
+    BodyIncrement, BodyState, added, advance, driven_from, driven_to, increment, nominal_motion,
+};
 use crate::chain::robot::Robot;
 use crate::chain::sensors;
 use crate::context::{Context, Motion, Surroundings};
@@ -40,16 +42,16 @@ pub struct BodyWindow<'a> {
     pub start: Pose<f64>,
     /// Neighbours; the steering angle is that of the samples.
     pub surroundings: Surroundings,
-    /// Where the neighbour is in the map at the beginning, in the middle and at the end, metres; without it,
-    /// it stands where the surroundings have it.
-    pub partner_m: Option<[[f64; 2]; 3]>,
+    /// Where the nearest robot is in the map at each sample of the window, metres; without it, it stands where
+    /// the surroundings have it.
+    pub partner_m: &'a [Option<[f64; 2]>],
 }
 
 impl<'a> BodyWindow<'a> {
     /// From the first to the last of these samples, with nothing known around them.
     pub fn whole(samples: &'a [EncoderSample], start: Pose<f64>, surroundings: Surroundings) -> Self {
         let ends = [0, samples.len().saturating_sub(1)];
-        Self { track: samples, ends, start, surroundings, partner_m: None }
+        Self { track: samples, ends, start, surroundings, partner_m: &[] }
     }
 
     fn samples(&self) -> &'a [EncoderSample] {
@@ -98,23 +100,21 @@ impl<'a> BodyWindow<'a> {
         let half_tick_rad = if ticks > 0.0 { S::constant(PI) / ticks } else { S::zero() };
         motion.wheel_angle_rad = from.angle_rad.map(|angle_rad| half_tick_rad + angle_rad);
         let steer_rad = f64::midpoint(from.steer_rad, to.steer_rad);
-        let partner_m = self.partner_at(f64::midpoint(from.time_s, to.time_s));
+        let partner_m = self.partner_at(from.time_s);
         Context {
             surroundings: Surroundings { steer_rad, partner_m, ..self.surroundings },
             ..Context::new(&model.nominal, from.time_s, motion).over(S::constant(to.time_s - from.time_s))
         }
     }
 
-    /// Where the neighbour is: on the parabola through its three places.
-    fn partner_at(&self, time_s: f64) -> Option<[f64; 2]> {
-        let Some([first, middle, last]) = self.partner_m else { return self.surroundings.partner_m };
-        let half_s = 0.5 * self.duration_s();
-        let share = if half_s > 0.0 { (time_s - self.middle_s()) / half_s } else { 0.0 };
-        Some([0, 1].map(|axis| {
-            let slope = 0.5 * (last[axis] - first[axis]);
-            let bend = 0.5 * (last[axis] + first[axis]) - middle[axis];
-            middle[axis] + share * (slope + share * bend)
-        }))
+    /// Where the nearest robot is in the middle of the step that begins at this stamp.
+    fn partner_at(&self, from_s: f64) -> Option<[f64; 2]> {
+        let last = self.partner_m.len().checked_sub(1);
+        let Some(last) = last else { return self.surroundings.partner_m };
+        let begun = self.samples().partition_point(|sample| sample.time_s <= from_s);
+        let at = |index: usize| self.partner_m[index.min(last)];
+        let (from, to) = (at(begun.saturating_sub(1))?, at(begun)?);
+        Some([0, 1].map(|axis| f64::midpoint(from[axis], to[axis])))
     }
 
     /// By how much more than evenly the robot has driven in the middle of the step that begins at a sample,
@@ -238,7 +238,8 @@ fn carried<S: Scalar>(
                 Some([from, to]) if to.time_s > from.time_s => {
                     let step = window.step(model, [from, to], pose, &mut state);
                     let share = rest_s / (to.time_s - from.time_s);
-                    step.share_applied_to(&pose, step.driven.map(|part| part * share), share)
+                    let driven = step.driven.map(|part| part * share);
+                    driven_from(&pose, driven, &step.added.share(share))
                 }
                 _ => pose,
             };
@@ -248,15 +249,28 @@ fn carried<S: Scalar>(
         if step_s > 0.0 {
             let ends = if forth { [here, there] } else { [there, here] };
             let step = window.step(model, ends, pose, &mut state);
-            if rest_s.value().abs() < step_s {
-                let share = rest_s / step_s;
+            let part_s = rest_s * sense;
+            if part_s.value() < step_s {
+                let share = part_s / step_s;
                 let bend = window.bend(model, at.min(next));
-                let size = share * sense;
-                let curve = size * (S::one() - size);
+                let curve = share * (S::one() - share) * sense;
                 let driven = [0, 1, 2].map(|part| step.driven[part] * share + bend[part] * curve);
-                return step.share_applied_to(&pose, driven, share);
+                // What happens at an instant is in this part of the step or not.
+                let mut context = window.context(model, ends, pose);
+                context.time_s = if forth { here.time_s } else { here.time_s - part_s.value() };
+                context.step_s = part_s;
+                let added = added(model, &context);
+                return if forth {
+                    driven_from(&pose, driven, &added)
+                } else {
+                    driven_to(&pose, driven, &added)
+                };
             }
-            pose = step.share_applied_to(&pose, step.driven.map(|part| part * sense), S::constant(sense));
+            pose = if forth {
+                driven_from(&pose, step.driven, &step.added)
+            } else {
+                driven_to(&pose, step.driven, &step.added)
+            };
             last = Some([at.min(next), at.max(next)]);
             rest_s -= S::constant(sense * step_s);
         }

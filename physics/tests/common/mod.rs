@@ -136,13 +136,14 @@ fn actuator<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
 fn body<S: Scalar>(model: &RobotModel<S>, out: &mut Vec<Named<S>>) {
     let samples = encoders();
     let mut states = [BodyState::default(); 3];
+    let partner_m: Vec<_> = (0..=25).map(|index| Some([0.7 + 0.008 * f64::from(index), 0.4])).collect();
     for (first, from_s) in (0..150).step_by(25).zip(instants(6, 0.5)) {
         let window = BodyWindow {
             track: &samples,
             ends: [first, first + 25],
             start: motion(from_s).pose,
             surroundings: surroundings(from_s),
-            partner_m: (first % 2 == 0).then_some([[0.7, 0.4], [0.8, 0.4], [0.9, 0.5]]),
+            partner_m: if first % 2 == 0 { &partner_m } else { &[] },
         };
         // Reference poses between samples, by a different way at each end.
         let [first_s, last_s] = window.stamps_s();

@@ -19,6 +19,8 @@ const SCENARIO: &str = include_str!("../../../scenarios/manoeuvres.toml");
 /// The slow triangle of speeds that dead band and stiction ask for: steps of the speed, m/s, how many, and how
 /// long each, seconds.
 const TRIANGLE: (f64, u32, f64) = (0.012, 8, 0.4);
+/// The yaw rate at which a wheel rolls as fast as at this speed on a straight line, with a track of 0.3 m, 1/m.
+const TURN_PER_M: f64 = 1.0 / 0.15;
 
 /// An effect and the scenario in which it acts.
 #[derive(Clone, Debug)]
@@ -72,20 +74,26 @@ fn case(mut scenario: Scenario, effect: Effect, values: Vec<f64>) -> Case {
         }
         if *robot == ROBOT && matches!(effect, Effect::MotorDeadband | Effect::Stiction) {
             settings.motion.policy = Policy::Script;
-            settings.motion.script = triangles(scenario.duration_s);
+            settings.motion.script = triangles(effect, scenario.duration_s);
         }
     }
     Case { effect, values, scenario }
 }
 
-/// Slow triangles of the speed, forth and back, for so long.
-fn triangles(duration_s: f64) -> Vec<[f64; 3]> {
+/// Slow triangles of the speed, forth and back, for so long; for a dead band also of the yaw rate, because on a
+/// straight line one of the speed and one of the wheels are the same.
+fn triangles(effect: Effect, duration_s: f64) -> Vec<[f64; 3]> {
     let (step_m_s, steps, each_s) = TRIANGLE;
     let shares = (1..=steps).chain((1..steps).rev()).map(f64::from);
+    let axes: &[[f64; 2]] =
+        if effect == Effect::MotorDeadband { &[[1.0, 0.0], [0.0, TURN_PER_M]] } else { &[[1.0, 0.0]] };
     let mut once = Vec::new();
-    for sense in [1.0, -1.0] {
-        once.extend(shares.clone().map(|share| [sense * share * step_m_s, 0.0, each_s]));
-        once.push([0.0, 0.0, each_s]);
+    for [along, turning] in axes {
+        for sense in [1.0, -1.0] {
+            let size = |share: f64| sense * share * step_m_s;
+            once.extend(shares.clone().map(|share| [along * size(share), turning * size(share), each_s]));
+            once.push([0.0, 0.0, each_s]);
+        }
     }
     let lasts_s: f64 = once.iter().map(|row| row[2]).sum();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]

@@ -4,8 +4,10 @@
 #![allow(clippy::expect_used, clippy::missing_panics_doc, reason = "helpers of tests fail by panicking")]
 
 mod cases;
+mod exceptions;
 mod outcome;
 mod table;
+mod wishes;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -14,21 +16,18 @@ use pleiad_mismatch::{KnownFit, fit_known};
 use pleiad_sim_peers::simulate;
 
 pub use cases::{Case, ROBOT, cases, cases_of};
+pub use exceptions::{EXCEPTIONS, Exception};
 pub use outcome::{Outcome, Row};
 pub use table::{rows, table};
+pub use wishes::{COVERED, Shortfall, Wish, covered, shortfalls};
 
 /// Seeds of the recordings of every effect.
 pub const SEEDS: std::ops::RangeInclusive<u64> = 1..=20;
 
-/// Simulates every case from every seed and fits it, on all processors; the result does not depend on how
-/// many there are. `told` gets each outcome as it comes.
-pub fn run(cases: &[Case], seeds: &[u64], mut told: impl FnMut(&Outcome)) -> Vec<Outcome> {
-    let one = |case: &Case| {
-        let outcome = Outcome::new(case, fits(case, seeds));
-        told(&outcome);
-        outcome
-    };
-    cases.iter().map(one).collect()
+/// Simulates a case from every seed and fits it, on all processors; the result does not depend on how many
+/// there are.
+pub fn run(case: &Case, seeds: &[u64]) -> Outcome {
+    Outcome::new(case, fits(case, seeds))
 }
 
 /// The fits of a case in the order of the seeds; `None` where the effect is not found.

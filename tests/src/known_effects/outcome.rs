@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use pleiad_estimation::geometry::wrap_angle;
 use pleiad_mismatch::{Interval, KnownFit};
 use pleiad_physics::{Effect, Parameter};
+use serde_json::{Value, json};
 
 use super::cases::{Case, has_size};
 
@@ -30,7 +31,7 @@ pub struct Row {
     /// Its name.
     pub label: String,
     /// Its unit.
-    pub unit: &'static str,
+    pub unit: String,
     /// The value injected.
     pub truth: f64,
     /// The size that errors are compared with.
@@ -43,8 +44,8 @@ pub struct Row {
     pub sigmas: Vec<f64>,
     /// Of how many the interval holds the truth.
     pub covered: usize,
-    /// What the intervals are from.
-    pub interval: Interval,
+    /// Whether intervals are profiles.
+    pub profile: bool,
 }
 
 impl Outcome {
@@ -54,7 +55,11 @@ impl Outcome {
         let fits: Vec<KnownFit> = fits.into_iter().flatten().collect();
         let parameters = case.effect.info().parameters.iter().zip(&case.values).enumerate();
         let rows = parameters
-            .filter(|(_, (parameter, truth))| !has_size(parameter.fit) || **truth != parameter.off)
+            .filter(|(_, (parameter, truth))| {
+                // A shape is there whether or not it has its usual value; a size that is off was not injected.
+                let is_shape = parameter.off != 0.0 && parameter.off.is_finite();
+                !has_size(parameter.fit) || **truth != parameter.off || is_shape
+            })
             .map(|(index, (parameter, truth))| Row::new(parameter, *truth, index, &fits))
             .collect();
         Self { effect: case.effect, rows, seeds, found: fits.len() }
@@ -64,20 +69,44 @@ impl Outcome {
     pub fn z_squares(&self) -> Vec<f64> {
         self.rows.iter().flat_map(Row::z_squares).collect()
     }
+
+    /// To be kept in a file.
+    pub fn to_json(&self) -> Value {
+        let rows: Vec<Value> = self.rows.iter().map(Row::to_json).collect();
+        json!({ "effect": self.effect.name(), "seeds": self.seeds, "found": self.found, "rows": rows })
+    }
+
+    /// What [`Outcome::to_json`] kept.
+    pub fn from_json(kept: &Value) -> Option<Self> {
+        Some(Self {
+            effect: Effect::from_name(kept["effect"].as_str()?)?,
+            rows: kept["rows"].as_array()?.iter().map(Row::from_json).collect::<Option<_>>()?,
+            seeds: size(&kept["seeds"])?,
+            found: size(&kept["found"])?,
+        })
+    }
+}
+
+fn size(kept: &Value) -> Option<usize> {
+    usize::try_from(kept.as_u64()?).ok()
+}
+
+fn numbers(kept: &Value) -> Option<Vec<f64>> {
+    kept.as_array()?.iter().map(Value::as_f64).collect()
 }
 
 impl Row {
     fn new(parameter: &Parameter, truth: f64, index: usize, fits: &[KnownFit]) -> Self {
         let mut row = Self {
             label: parameter.label(),
-            unit: parameter.unit,
+            unit: parameter.unit.to_owned(),
             truth,
             size: if parameter.name == "t_on_s" { ONSET_SIZE_S } else { truth.abs() },
             right: None,
             errors: Vec::new(),
             sigmas: Vec::new(),
             covered: 0,
-            interval: Interval::None,
+            profile: false,
         };
         let found = fits.iter().filter_map(|fit| fit.parameters.get(index));
         if !has_size(parameter.fit) {
@@ -92,9 +121,37 @@ impl Row {
             row.errors.push(turned);
             row.sigmas.push(sigma);
             row.covered += usize::from((low + shift..=high + shift).contains(&truth));
-            row.interval = found.interval;
+            row.profile = found.interval == Interval::Profile;
         }
         row
+    }
+
+    fn to_json(&self) -> Value {
+        json!({
+            "label": self.label,
+            "unit": self.unit,
+            "truth": self.truth,
+            "size": self.size,
+            "right": self.right,
+            "errors": self.errors,
+            "sigmas": self.sigmas,
+            "covered": self.covered,
+            "profile": self.profile,
+        })
+    }
+
+    fn from_json(kept: &Value) -> Option<Self> {
+        Some(Self {
+            label: kept["label"].as_str()?.to_owned(),
+            unit: kept["unit"].as_str()?.to_owned(),
+            truth: kept["truth"].as_f64()?,
+            size: kept["size"].as_f64()?,
+            right: size(&kept["right"]),
+            errors: numbers(&kept["errors"])?,
+            sigmas: numbers(&kept["sigmas"])?,
+            covered: size(&kept["covered"])?,
+            profile: kept["profile"].as_bool()?,
+        })
     }
 
     /// The root mean square of the standard errors.

@@ -7,7 +7,9 @@ use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::held_out::{EMBARGO_S, FOLDS, Gain, fold, summed};
 use crate::diagnosis::noise;
 use crate::diagnosis::select::{FAMILYWISE, LEAST_GAIN};
-use crate::diagnosis::spread::maximum::{Bounds, Density, Optimum, Uncertainty, maximize, uncertainty};
+use crate::diagnosis::spread::maximum::{
+    Bounds, Density, Optimum, Uncertainty, expected, maximize, uncertainty,
+};
 use crate::diagnosis::support::ODDS;
 use crate::diagnosis::unit::{BLOCK_S, Unit};
 
@@ -194,6 +196,11 @@ impl Family<'_, '_> {
     /// What an optimum with these members is known to.
     pub(super) fn known(&self, active: &[usize], optimum: &Optimum) -> Option<Uncertainty> {
         uncertainty(self.density.as_ref(), &self.bounds, optimum, &self.free(active))
+    }
+
+    /// What would be known of these members where they are all but off.
+    pub(super) fn expected(&self, active: &[usize], there: &Optimum) -> Option<Uncertainty> {
+        expected(self.density.as_ref(), &self.bounds, there, &self.free(active))
     }
 
     /// Adds effects as long as one is significant among so many tests; then each against its absence and its

@@ -119,7 +119,13 @@ pub(super) fn undetected(
         for (&index, (&off, &start)) in member.parameters.iter().zip(member.off.iter().zip(&member.start)) {
             there.parameters[index] = if off.is_finite() { off + 1e-3 * (start - off) } else { start };
         }
-        let known = if member.chances.is_some() { None } else { family.known(&[position], &there) };
+        let is_root = member.shown.iter().any(|shown| matches!(shown, Shown::Root(_)));
+        let known = match member.chances {
+            Some(_) => None,
+            // Where a variance is off, the likelihood may bend either way.
+            None if is_root => family.expected(&[position], &there),
+            None => family.known(&[position], &there),
+        };
         for (shown, parameter) in member.shown.iter().zip(info.parameters) {
             let threshold = family
                 .units

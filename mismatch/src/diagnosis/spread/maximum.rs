@@ -216,6 +216,22 @@ pub(super) fn uncertainty(
     covariance.iter().all(|value| value.is_finite()).then_some(Uncertainty { free, covariance, naive })
 }
 
+/// What would be known of parameters, by the outer product of the scores of rows: each has the mean zero given
+/// the rows before it. It is never negative, as the curvature may be where a variance is off.
+pub(super) fn expected(
+    density: &dyn Density,
+    bounds: &[Bounds],
+    there: &Optimum,
+    free: &[usize],
+) -> Option<Uncertainty> {
+    let scores = scores_at(density, bounds, &there.parameters, free, &|_| true);
+    let shown: Vec<usize> =
+        (0..free.len()).filter(|&own| scores[own].iter().any(|score| *score != 0.0)).collect();
+    let covariance = outer_inverse(&scores, &shown)?;
+    let free = shown.into_iter().map(|own| free[own]).collect();
+    Some(Uncertainty { free, naive: covariance.clone(), covariance })
+}
+
 fn total(density: &dyn Density, parameters: &[f64], kept: &dyn Fn(usize) -> bool, values: &mut [f64]) -> f64 {
     density.fill(parameters, values);
     let sum: f64 = values.iter().enumerate().filter(|(row, _)| kept(*row)).map(|(_, value)| value).sum();

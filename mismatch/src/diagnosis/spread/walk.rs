@@ -1,5 +1,8 @@
 //! A gyro's bias that wanders: `b(t + dt) = b(t) + N(0, q^2 dt)`, read with white noise of unknown size. The
-//! likelihood is that of a scalar Kalman filter's innovations (`schweppe1965`), which knows nothing of the first bias.
+//! likelihood is that of a Kalman filter's innovations (`schweppe1965`), which knows nothing of the first bias.
+//!
+//! What the encoders say of the yaw rate is wrong at the ends of a window, by a part of a tick: two neighbours have
+//! this error with opposite signs. As white noise it would hide a walk, so it is a second state of the filter.
 //!
 //! A bias that warms up follows a curve instead, and is the rival: the mean's own terms of the gyro's bias are
 //! left out of the residuals here.
@@ -15,6 +18,7 @@ use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, S
 use crate::diagnosis::spread::maximum::{Bounds, Density, maximize, uncertainty};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::Unit;
+use crate::track::median_step;
 
 /// Logarithm of the sigma of a window.
 const NOISE: usize = 0;
@@ -27,6 +31,12 @@ const WARM: usize = 3;
 const TIME: usize = 4;
 /// The variance of the first bias about its parameter: so large that it says nothing, or zero.
 const UNKNOWN: usize = 5;
+/// The variance that the error at one end of a window adds, (rad/s)^2.
+const EDGE: usize = 6;
+/// Where its search begins, as a share of the variance of a window.
+const EDGE_SHARE: f64 = 0.2;
+/// A window that begins so much later than the usual one, as a share, does not begin where the one before ended.
+const JOINED: f64 = 1.2;
 /// A bias beyond this is none, rad/s.
 const LARGEST_BIAS: f64 = 0.1;
 
@@ -34,6 +44,8 @@ struct Readings {
     /// Seconds since the unit's first, and the residual; a unit starts at `None`.
     rows: Vec<(Option<f64>, f64, f64)>,
     blocks: Vec<usize>,
+    /// From one window to the next that begins where it ended, seconds.
+    usual_s: f64,
 }
 
 impl Density for Readings {
@@ -48,20 +60,32 @@ impl Density for Readings {
     fn fill(&self, parameters: &[f64], into: &mut [f64]) {
         let white = libm::exp(2.0 * parameters[NOISE]);
         let constant_s = libm::exp(parameters[TIME]);
-        let (mut bias, mut variance) = (0.0, 0.0);
+        let edge = parameters[EDGE];
+        // Bias and error at the beginning of the window: means, variances, covariance.
+        let (mut bias, mut begun) = (0.0, 0.0);
+        let (mut of_bias, mut of_begun, mut between) = (0.0, 0.0, 0.0);
         for ((step_s, age_s, residual), value) in self.rows.iter().zip(into) {
             if let Some(step_s) = step_s {
-                variance += parameters[WALK] * step_s;
+                of_bias += parameters[WALK] * step_s;
+                if *step_s > JOINED * self.usual_s {
+                    (begun, of_begun, between) = (0.0, edge, 0.0);
+                }
             } else {
-                (bias, variance) = (parameters[FIRST], parameters[UNKNOWN]);
+                (bias, of_bias) = (parameters[FIRST], parameters[UNKNOWN]);
+                (begun, of_begun, between) = (0.0, edge, 0.0);
             }
             let warm = parameters[WARM] * -libm::expm1(-age_s / constant_s);
-            let sigma = (variance + white).sqrt();
-            let innovation = residual - warm - bias;
+            // Read: bias, less the error at the beginning, plus that at the end, plus white noise.
+            let variance = of_bias - 2.0 * between + of_begun + edge + white;
+            let sigma = variance.sqrt();
+            let innovation = residual - warm - bias + begun;
             *value = bounded(innovation / sigma, sigma);
-            let gain = variance / (variance + white);
+            let (gain, gain_end) = ((of_bias - between) / variance, edge / variance);
             bias += gain * innovation;
-            variance *= 1.0 - gain;
+            begun = gain_end * innovation;
+            of_bias -= gain * gain * variance;
+            of_begun = edge - gain_end * gain_end * variance;
+            between = -gain * gain_end * variance;
         }
     }
 }
@@ -88,6 +112,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
             before = Some(time_s);
         }
     }
+    let usual_s = median_step(rows.iter().map(|row| row.1));
     // What changes from one window to the next is white noise; a walk is slow beside it.
     let changes: Vec<f64> = rows.windows(2).map(|pair| (pair[1].2 - pair[0].2).powi(2)).collect();
     let sigma = (0.5 * changes.iter().sum::<f64>() / changes.len().max(1) as f64).sqrt();
@@ -105,6 +130,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
         Bounds { low: cold, high: hot, scale: sigma },
         Bounds { low: fast.ln(), high: slow.ln(), scale: 0.1 },
         Bounds { low: 0.0, high: 1.0, scale: 1.0 },
+        Bounds { low: 0.0, high: 1.0, scale: sigma * sigma },
     ];
     let walk = Member {
         effect: Effect::GyroRandomWalk,
@@ -125,12 +151,20 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
         chances: None,
     };
     Some(Family {
-        density: Box::new(Readings { blocks: blocks(units, &places), rows }),
+        density: Box::new(Readings { blocks: blocks(units, &places), usual_s, rows }),
         units: units.to_vec(),
         places,
         bounds,
-        start: vec![sigma.ln(), 0.0, 0.0, 0.0, 60.0_f64.ln(), LARGEST_BIAS * LARGEST_BIAS],
-        nuisances: vec![NOISE],
+        start: vec![
+            sigma.ln(),
+            0.0,
+            0.0,
+            0.0,
+            60.0_f64.ln(),
+            LARGEST_BIAS * LARGEST_BIAS,
+            EDGE_SHARE * sigma * sigma,
+        ],
+        nuisances: vec![NOISE, EDGE],
         members: vec![walk, warming],
     })
 }
@@ -140,7 +174,7 @@ pub(super) fn explained(family: &Family<'_, '_>, walk: &Shows, fit: &Fit) -> Vec
     // The first bias as a parameter, beside the walk.
     let mut start = walk.with.parameters.clone();
     start[UNKNOWN] = 0.0;
-    let free = [NOISE, FIRST, WALK];
+    let free = [NOISE, EDGE, FIRST, WALK];
     let with = maximize(family.density.as_ref(), &family.bounds, &start, &free, &|_| true);
     let known = uncertainty(family.density.as_ref(), &family.bounds, &with, &free);
     let first = Contrast { weights: vec![(FIRST, 1.0)], threshold: 0.0 };
@@ -168,20 +202,28 @@ mod tests {
 
     #[test]
     fn innovations_have_the_density_of_the_whole() {
-        let times = [0.0, 0.5, 1.0, 1.7, 2.2];
+        let times = [0.0, 0.5, 1.0, 1.8, 2.3];
         let residuals = [0.3, -0.1, 0.4, 0.9, 0.5];
         let mut rows = Vec::new();
         for (index, residual) in residuals.iter().enumerate() {
             let step_s = index.checked_sub(1).map(|before| times[index] - times[before]);
             rows.push((step_s, times[index], *residual));
         }
-        let readings = Readings { rows, blocks: vec![0; 5] };
+        let readings = Readings { rows, blocks: vec![0; 5], usual_s: 0.6 };
         let (sigma, first, walk, warm, constant_s, unknown) = (0.4_f64, 0.1, 0.09, 0.2, 1.5_f64, 0.25);
+        let edge = 0.07;
         let mut values = vec![0.0; 5];
-        readings.fill(&[sigma.ln(), first, walk, warm, constant_s.ln(), unknown], &mut values);
-        // cov(i, j) = unknown + walk min(t_i, t_j) + sigma^2 where i = j.
+        readings.fill(&[sigma.ln(), first, walk, warm, constant_s.ln(), unknown, edge], &mut values);
+        // cov(i, j) = unknown + walk min(t_i, t_j), and where i = j, sigma^2 + 2 edge. Neighbours share an end
+        // with opposite signs, but for the pair 0.8 s apart.
         let covariance = DMatrix::from_fn(5, 5, |i, j| {
-            unknown + walk * times[i].min(times[j]) + if i == j { sigma * sigma } else { 0.0 }
+            let shared = match i.abs_diff(j) {
+                0 => sigma * sigma + 2.0 * edge,
+                1 if i.min(j) == 2 => 0.0,
+                1 => -edge,
+                _ => 0.0,
+            };
+            unknown + walk * times[i].min(times[j]) + shared
         });
         let mean = |time_s: f64| first + warm * (1.0 - (-time_s / constant_s).exp());
         let error = DVector::from_fn(5, |i, _| residuals[i] - mean(times[i]));
