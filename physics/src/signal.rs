@@ -85,7 +85,8 @@ impl<S: Scalar> Rolling<S> {
 pub struct Castor<S> {
     /// 1 forward, -1 backward, 0 before the first motion.
     pub direction: i8,
-    /// Rolled since the direction last reversed, metres; `None` before the first reversal.
+    /// Rolled since the castor last began to swing round, metres: negative where it begins within the step;
+    /// `None` before the first reversal.
     pub since_reversal_m: Option<S>,
     /// Rolled against the direction so far, metres; from the start on, rolled either way.
     pub against_m: f64,

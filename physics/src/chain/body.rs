@@ -205,8 +205,8 @@ fn kinematics<S: Scalar>(
 /// Notes a reversal; the castor begins to swing round in the step in which the robot has rolled
 /// [`CASTOR_PLAY_M`] the other way. Less is no reversal: a robot that spins does not roll, but for the ticks of
 /// its encoders.
-fn turn_castor<S: Scalar>(castor: &mut Castor<S>, forward_m: S) {
-    let forward_m = forward_m.value();
+fn turn_castor<S: Scalar>(castor: &mut Castor<S>, forward: S) {
+    let forward_m = forward.value();
     if castor.direction == 0 {
         castor.against_m += forward_m;
         if castor.against_m.abs() > CASTOR_PLAY_M {
@@ -217,7 +217,8 @@ fn turn_castor<S: Scalar>(castor: &mut Castor<S>, forward_m: S) {
     }
     castor.against_m = (castor.against_m - f64::from(castor.direction) * forward_m).max(0.0);
     if castor.against_m > CASTOR_PLAY_M {
-        castor.since_reversal_m = Some(S::zero());
+        // It begins within the step: before, it was not yet there.
+        castor.since_reversal_m = Some(-forward.abs() + (castor.against_m - CASTOR_PLAY_M));
         castor.direction = -castor.direction;
         castor.against_m = 0.0;
     }
@@ -276,6 +277,7 @@ mod tests {
         for _ in 0..1000 {
             turn_castor(&mut castor, -2e-6);
         }
-        assert_eq!((castor.since_reversal_m, castor.direction), (Some(0.0), -1));
+        let since_m = castor.since_reversal_m.expect("a reversal");
+        assert!((-2e-6..=0.0).contains(&since_m) && castor.direction == -1, "{since_m}");
     }
 }

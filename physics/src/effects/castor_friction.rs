@@ -33,7 +33,8 @@ impl EffectModel for CastorFriction {
         let Some(since_m) = signal.castor.since_reversal_m else { return };
         let (kick, decay_m) = (values[0], values[1]);
         let until_m = since_m + signal.forward_m.abs();
-        let share = (-since_m / decay_m).exp() - (-until_m / decay_m).exp();
+        let from_m = since_m.max(S::zero());
+        let share = (-from_m / decay_m).exp() - (-until_m / decay_m).exp();
         signal.yaw_rad += kick * share * f64::from(signal.castor.direction);
     }
 }
