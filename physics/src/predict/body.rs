@@ -16,7 +16,7 @@ use crate::scalar::Scalar;
 
 /// The longest step of a window driven by commands, seconds. State-dependent effects are taken from the
 /// beginning of a step, those of the actuator at the heading in its middle.
-const COMMANDED_STEP_S: f64 = 0.1;
+const COMMANDED_STEP_S: f64 = 0.05;
 
 /// A sample of the wheels' cumulative angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -288,7 +288,7 @@ fn seen_by_truth<S: Scalar>(model: &RobotModel<S>, motion: Motion<S>, time_s: f6
 
 /// The motion that the reference system sees over a window that is driven by commands alone, for
 /// recordings without encoders. `robot` keeps servo and body from window to window; it is put to the
-/// window's beginning and driven in steps of about 100 ms.
+/// window's beginning and driven in steps of about 50 ms.
 pub fn commanded_truth_change<S: Scalar>(
     model: &RobotModel<S>,
     scheduled: &[Scheduled<S>],
