@@ -58,8 +58,9 @@ struct Sightings {
 }
 
 impl Sightings {
-    fn sigmas(row: &Row, parameters: &[f64]) -> [f64; 2] {
-        let base = [0, 1].map(|part| libm::exp(parameters[BASE + 2 * row.kind + part]));
+    /// Of range and bearing; `bases` are those at no range and no turn, by kind.
+    fn sigmas(row: &Row, bases: &[[f64; 2]; 2], parameters: &[f64]) -> [f64; 2] {
+        let base = bases[row.kind];
         let range = base[0] + row.range_m * (parameters[LINEAR] + row.range_m * parameters[SQUARE]);
         let bearing = base[1] + parameters[BLUR] * row.yaw_rate_rad_s.abs();
         [range.max(LEAST_SIGMA * base[0]), bearing.max(LEAST_SIGMA * base[1])]
@@ -68,6 +69,9 @@ impl Sightings {
 
 /// Of the errors of a range and a bearing, where they are there.
 fn log_density(errors: &[Option<f64>; 2], sigmas: [f64; 2], student: Student) -> f64 {
+    if let [Some(range), Some(bearing)] = *errors {
+        return student.log_density_of_two([range / sigmas[0], bearing / sigmas[1]], sigmas[0] * sigmas[1]);
+    }
     let part = |(error, sigma): (&Option<f64>, f64)| {
         error.map_or(0.0, |error| student.log_density(error / sigma, sigma))
     };
@@ -87,8 +91,9 @@ impl Density for Sightings {
         let student = Student::new(parameters[TAILS]);
         let mixed = self.kept * libm::exp(parameters[MIXED]);
         let (own, other) = (libm::log1p(-mixed), libm::log(mixed));
+        let bases = [0, 1].map(|kind| [0, 1].map(|part| libm::exp(parameters[BASE + 2 * kind + part])));
         for (row, value) in self.rows.iter().zip(into) {
-            let sigmas = Self::sigmas(row, parameters);
+            let sigmas = Self::sigmas(row, &bases, parameters);
             *value = log_density(&row.errors, sigmas, student);
             if row.choices > 0 && mixed > 0.0 {
                 let others = row.others.iter().map(|errors| log_density(errors, sigmas, student));
