@@ -5,14 +5,11 @@ use std::collections::BTreeMap;
 use pleiad_estimation::sample::Sample;
 use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_physics::{RobotModel, Surroundings};
-use pleiad_recording::{Recording, RobotRecording};
+use pleiad_recording::{Recording, RobotRecording, effect_epoch};
 
 use crate::plan::Plan;
 use crate::track::Track;
 use crate::{actuator, body, commanded, gyro, sensors, sightings};
-
-/// Stamps beyond this count from another epoch than the beginning of the recording, seconds: three years.
-const FOREIGN_EPOCH_S: f64 = 1e8;
 
 /// What a recording says, prepared once and compared with as many models as wanted.
 pub struct Evidence<'a> {
@@ -108,8 +105,7 @@ fn origin(recording: &Recording) -> Timestamp {
         let command = own.commands.first().map(|command| command.time);
         samples.chain(command).chain(own.truth.first().map(|sample| sample.time))
     });
-    let first_s = firsts.min().map_or(0.0, Timestamp::seconds);
-    if first_s > FOREIGN_EPOCH_S { Timestamp::from_seconds(first_s.floor()) } else { Timestamp(0) }
+    effect_epoch(firsts.min().unwrap_or(Timestamp(0)))
 }
 
 /// Whether there are several readings and all are equal.

@@ -29,7 +29,7 @@ pub use effect_spec::{DeclaredEffect, EffectSpec, ScopeSpec, SpecError};
 pub use error::RecordingError;
 pub use folder::{FORMAT_VERSION, Overwrite, read_folder, write_folder};
 pub use ingest::ReadOptions;
-pub use model::{nominal_model, read_model, write_model};
+pub use model::{effect_epoch, nominal_model, read_model, write_model};
 pub use mrclam::read_mrclam;
 pub use nominal::{read_nominal, write_nominal};
 pub use open::open;

@@ -2,13 +2,24 @@
 
 use std::path::Path;
 
-use pleiad_estimation::RobotId;
+use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_physics::{Nominal as Parameters, RobotModel};
 
 use crate::error::RecordingError;
 use crate::folder::write_whole;
 use crate::nominal::{nominal_text, read_nominal};
 use crate::types::{Nominal, NominalNoise, NominalRangeSensor, NominalRobot};
+
+/// Stamps beyond this, seconds, count from an epoch elsewhere (three years after zero), not from the start.
+const FOREIGN_EPOCH_S: f64 = 1e8;
+
+/// From when times in effects count (onsets, drifts, warming up), given the first stamp of a recording or of a
+/// robot: from zero, or, where stamps count from a foreign epoch as Unix time does, from the whole second of the
+/// first.
+pub fn effect_epoch(first: Timestamp) -> Timestamp {
+    let first_s = first.seconds();
+    if first_s > FOREIGN_EPOCH_S { Timestamp::from_seconds(first_s.floor()) } else { Timestamp(0) }
+}
 
 /// The model of one robot: its declared parameters, drive and effects.
 pub fn nominal_model(

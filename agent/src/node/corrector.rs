@@ -15,6 +15,7 @@ use pleiad_estimation::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timesta
 use pleiad_physics::Pose;
 use pleiad_physics::correct::{Correction, OdometryCorrection, OdometryReading, Place, Polar};
 use pleiad_physics::signal::Target as Seen;
+use pleiad_recording::effect_epoch;
 
 use crate::config::{RobotCorrection, VelocityName};
 
@@ -29,6 +30,8 @@ pub(super) struct Corrector {
     last: Option<Reading>,
     /// This robot's facts that need nobody else.
     own: Ledger,
+    /// From when times in effects count; known with the first sample.
+    epoch: Option<Timestamp>,
 }
 
 impl Corrector {
@@ -40,7 +43,14 @@ impl Corrector {
             odometry: OdometryCorrection::default(),
             last: None,
             own: Ledger::new(fold),
+            epoch: None,
         }
+    }
+
+    /// A time as effects count it: seconds from the first sample if stamps count from a foreign epoch. The
+    /// journal holds that sample, so that a second life counts alike.
+    fn effect_time_s(&mut self, time: Timestamp) -> f64 {
+        time.seconds_since(*self.epoch.get_or_insert_with(|| effect_epoch(time)))
     }
 
     /// Hears what this robot has said in its log.
@@ -58,7 +68,8 @@ impl Corrector {
 
     /// A sample with its stamp as it would be by a perfect clock and without latency.
     pub(super) fn on_time(&mut self, sample: &Sample, at: Option<(BootIndex, &NominalTrajectory)>) -> Sample {
-        let clock_s = self.correction.clock_error_s(sample.time.seconds());
+        let time_s = self.effect_time_s(sample.time);
+        let clock_s = self.correction.clock_error_s(time_s);
         let time = sample.time.plus_seconds(-clock_s);
         let place = self.last_place(time, at);
         let latency_s = match sample.reading {
@@ -83,7 +94,8 @@ impl Corrector {
     /// The first odometry of a boot, as an increment from nowhere.
     pub(super) fn begin(&mut self, sample: &Sample) -> Result<Sample, OdometryRefusal> {
         let reading = self.reading(sample)?;
-        self.odometry.restart(&self.correction, sample.time.seconds(), reading);
+        let time_s = self.effect_time_s(sample.time);
+        self.odometry.restart(&self.correction, time_s, reading);
         self.last = Some(sample.reading);
         Ok(Sample { time: sample.time, reading: Reading::Increment(Pose2::identity()) })
     }
@@ -102,7 +114,8 @@ impl Corrector {
         let start = self.last_place(sample.time, at).pose;
         // What is refused leaves no trace.
         let mut odometry = self.odometry.clone();
-        let moved = odometry.step(&self.correction, start, sample.time.seconds(), reading);
+        let time_s = self.effect_time_s(sample.time);
+        let moved = odometry.step(&self.correction, start, time_s, reading);
         if ![moved.x_m, moved.y_m, moved.yaw_rad].iter().all(|number| number.is_finite()) {
             return Err(OdometryRefusal::NotFinite { time: sample.time });
         }
@@ -175,7 +188,7 @@ impl Corrector {
     fn last_place(&mut self, time: Timestamp, at: Option<(BootIndex, &NominalTrajectory)>) -> Place {
         match at {
             Some((boot, trajectory)) => self.place(time, boot, &trajectory.end().1.nominal),
-            None => Place { time_s: time.seconds(), pose: Pose::identity() },
+            None => Place { time_s: self.effect_time_s(time), pose: Pose::identity() },
         }
     }
 
@@ -184,7 +197,7 @@ impl Corrector {
         let joint = self.own.settle();
         let member = joint.member(self.robot).filter(|member| member.boot == boot);
         let pose = member.map_or(*nominal, |member| member.correction.compose(nominal));
-        Place { time_s: time.seconds(), pose: Pose::new(pose.x_m(), pose.y_m(), pose.yaw_rad()) }
+        Place { time_s: self.effect_time_s(time), pose: Pose::new(pose.x_m(), pose.y_m(), pose.yaw_rad()) }
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use pleiad_agent::config::{AgentConfig, VelocityName, YawName};
 use pleiad_agent::{Node, Record};
-use pleiad_estimation::fact::{Absolute, Body, Observation, Quantity};
+use pleiad_estimation::fact::{Absolute, Body, Entry, Observation, Quantity};
 use pleiad_estimation::geometry::Vector3;
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
@@ -138,6 +138,25 @@ fn a_clock_that_is_ahead_is_set_back_on_every_sample() {
     // The journal keeps what was read.
     let Some(Record::Sample(kept)) = handled.journal.last() else { panic!("no sample") };
     assert_eq!(kept.time, seconds(10.75));
+}
+
+#[test]
+fn a_clock_that_drifts_has_drifted_since_the_first_sample_where_stamps_are_unix_time() {
+    // 500 ppm for 4000 s are 2 s. Since 1970 they would be a week.
+    let mut node = node_with(&[(Effect::ClockDrift, &[500.0])], |_| {});
+    let began_s = 1_248_272_000.0;
+    let boots_at = |said: Vec<Entry>| {
+        let boot = said.iter().find_map(|entry| match &entry.body {
+            Body::Boot(boot) => Some(boot.time),
+            _ => None,
+        });
+        boot.expect("a boot").seconds_since(seconds(began_s))
+    };
+    let first_s = boots_at(feed(&mut node, velocity(began_s)).published);
+    assert!(first_s.abs() < 1e-6, "{first_s}");
+    // After so long a gap the robot boots anew.
+    let second_s = boots_at(feed(&mut node, velocity(began_s + 4000.0)).published);
+    assert!((second_s - 3998.0).abs() < 0.01, "{second_s}");
 }
 
 #[test]
