@@ -121,6 +121,8 @@ pub enum Omission {
     NotFinite(usize),
     /// Fewer residuals than a summary needs: found, needed.
     TooFew(usize, usize),
+    /// Commands and motion do not go together: the correlation of their windows in hundredths.
+    Unrelated(i32),
 }
 
 impl Omission {
@@ -135,7 +137,7 @@ impl Omission {
             | Self::CommandGap(count)
             | Self::SparseWindow(count)
             | Self::NotFinite(count) => *count > few,
-            Self::NotRecorded(_) | Self::Constant(..) | Self::TooFew(..) => true,
+            Self::NotRecorded(_) | Self::Constant(..) | Self::TooFew(..) | Self::Unrelated(_) => true,
         }
     }
 }
@@ -158,6 +160,12 @@ impl fmt::Display for Omission {
             Self::SparseWindow(count) => write!(f, "{count} windows left out, with too few readings"),
             Self::NotFinite(count) => write!(f, "{count} left out that are no finite numbers"),
             Self::TooFew(found, needed) => write!(f, "{found} residuals, a summary needs {needed}"),
+            Self::Unrelated(hundredths) => write!(
+                f,
+                "commands and motion do not go together (correlation {:.2}): are the commands of this run, \
+                 of this robot and by its clock?",
+                f64::from(*hundredths) / 100.0
+            ),
         }
     }
 }

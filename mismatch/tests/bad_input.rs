@@ -303,6 +303,24 @@ fn what_the_rest_of_a_damaged_recording_shows_is_named() {
 }
 
 #[test]
+fn commands_of_another_time_are_said_to_be_and_nothing_is_found_in_them() {
+    let mut recording = recorded(Some(LEVER));
+    let commands = &mut own(&mut recording).commands;
+    let opposite: Vec<[f64; 2]> =
+        commands.iter().rev().map(|own| [own.forward_m_s, own.yaw_rate_rad_s]).collect();
+    for (command, [forward_m_s, yaw_rate_rad_s]) in commands.iter_mut().zip(opposite) {
+        (command.forward_m_s, command.yaw_rate_rad_s) = (forward_m_s, yaw_rate_rad_s);
+    }
+    let findings = found(recording);
+    let names: Vec<_> = findings.findings.iter().filter_map(|own| own.effect.as_deref()).collect();
+    assert_eq!(names, ["gps_lever_arm"], "what has nothing to do with commands");
+    for effect in ["command_delay", "actuator_gain", "speed_saturation"] {
+        let told = findings.untestable.iter().find(|own| own.effect == effect).unwrap();
+        assert!(told.why.contains("commands and motion do not go together"), "{effect}: {}", told.why);
+    }
+}
+
+#[test]
 fn nothing_is_claimed_of_a_moment_however_much_acts_in_it() {
     let mut recording = recorded(Some(LEVER));
     for until_s in [15.0, 3.0, 0.3] {

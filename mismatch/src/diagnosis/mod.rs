@@ -19,6 +19,7 @@ mod parallel;
 mod power;
 mod profile;
 mod refine;
+mod related;
 mod rolled;
 mod run;
 mod select;

@@ -9,6 +9,7 @@ use pleiad_physics::{Dual, Floors, RobotModel, Scalar, Variable};
 
 use crate::channel::Channel;
 use crate::compare::{agitation_of, residuals_of};
+use crate::diagnosis::related::unrelated;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::evidence::Evidence;
@@ -152,7 +153,12 @@ impl<'a> Unit<'a> {
             agitation: Vec::new(),
         };
         for channel in Channel::ALL {
-            let found = residuals_of(evidence, robot, &unit.nominal, channel);
+            let mut found = residuals_of(evidence, robot, &unit.nominal, channel);
+            if let Some(correlation) = unrelated(evidence, robot, &unit.nominal, &found) {
+                found.rows.clear();
+                #[allow(clippy::cast_possible_truncation, reason = "at most 100")]
+                found.omissions.push(Omission::Unrelated((100.0 * correlation).round() as i32));
+            }
             let components = channel.components().len();
             let first_scale = unit.scales.len();
             if !found.rows.is_empty() {
