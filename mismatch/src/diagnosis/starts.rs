@@ -19,6 +19,8 @@ const CELLS: [usize; 3] = [2, 4, 7];
 /// Values of a threshold that are tried, and the ratio of the greatest and the least.
 const THRESHOLDS: usize = 24;
 const THRESHOLD_RANGE: f64 = 60.0;
+/// The same of a limit.
+const LIMIT_RANGE: f64 = 8.0;
 /// A change of command takes at least this long to follow, seconds: what bounds an acceleration limit that
 /// can act.
 const SHORTEST_STEP_S: f64 = 0.02;
@@ -239,8 +241,13 @@ pub(crate) fn thresholds(parameter: &Parameter, units: &[&Unit<'_>]) -> Vec<f64>
         })
         .fold(0.0, f64::max);
     let greatest = parameter.plausible.1.min(demand);
-    // With a small acceleration a robot gets there later.
-    let range = if parameter.unit == "m/s^2" { LONGEST_STEP_S / SHORTEST_STEP_S } else { THRESHOLD_RANGE };
+    // A limit of speed far below what is asked for would stop the robot; a threshold may be small, and with a
+    // small acceleration a robot gets there later.
+    let range = match parameter.unit {
+        "m/s^2" => LONGEST_STEP_S / SHORTEST_STEP_S,
+        _ if parameter.off.is_finite() => THRESHOLD_RANGE,
+        _ => LIMIT_RANGE,
+    };
     let least = parameter.plausible.0.max(greatest / range);
     if greatest.partial_cmp(&least) != Some(std::cmp::Ordering::Greater) {
         return Vec::new();
