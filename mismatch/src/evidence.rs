@@ -82,7 +82,8 @@ impl<'a> Evidence<'a> {
         Some((self.tracks.get(&robot)?, self.plans.get(&robot)?))
     }
 
-    /// The nearest other robot whose truth is known. Steering and voltage are not recorded.
+    /// The nearest other robot whose truth is known. The steering angle comes with the samples of the encoders;
+    /// voltage is not recorded.
     pub(crate) fn surroundings(&self, robot: RobotId, time_s: f64, place: Option<[f64; 2]>) -> Surroundings {
         let others = self.tracks.iter().filter(|(other, _)| **other != robot);
         let partner_m = place.and_then(|own| {

@@ -7,11 +7,8 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use pleiad_physics::Effect;
-use pleiad_tests::known_effects::{Case, Outcome, SEEDS, cases, cases_of, rows, run, table};
-
-/// What the table stands between.
-const MARKS: [&str; 2] = ["<!-- table -->", "<!-- end -->"];
+use pleiad_tests::known_effects::{Case, Outcome, SEEDS, cases, cases_named, rows, run, table};
+use pleiad_tests::page::replace;
 
 fn main() -> ExitCode {
     match written(std::env::args().skip(1)) {
@@ -21,16 +18,6 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-/// Puts the table between the marks of a page.
-fn replace(file: &str, table: &str) -> Result<(), String> {
-    let page = std::fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))?;
-    let [begin, end] = MARKS;
-    let (before, rest) = page.split_once(begin).ok_or_else(|| format!("{file}: no line {begin}"))?;
-    let (_, after) = rest.split_once(end).ok_or_else(|| format!("{file}: no line {end}"))?;
-    let page = format!("{before}{begin}\n\n{table}\n{end}{after}");
-    std::fs::write(file, page).map_err(|error| format!("{file}: {error}"))
 }
 
 fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
@@ -48,11 +35,7 @@ fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
             }
             "--out" => out = Some(value("a page")?),
             "--keep" => keep = Some(PathBuf::from(value("a folder")?)),
-            name => {
-                let effect = Effect::from_name(name)
-                    .ok_or_else(|| format!("no effect `{name}`; see pleiad effects"))?;
-                chosen.extend(cases_of(effect));
-            }
+            name => chosen.extend(cases_named(name)?),
         }
     }
     if chosen.is_empty() {

@@ -5,8 +5,7 @@ use std::io::{self, Write as _};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use pleiad_physics::Effect;
-use pleiad_tests::known_effects::{Case, cases, cases_of};
+use pleiad_tests::known_effects::{Case, cases, cases_named};
 use pleiad_tests::naming::{Told, row, table, tell};
 use pleiad_tests::page::replace;
 
@@ -21,7 +20,7 @@ fn main() -> ExitCode {
 }
 
 fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
-    let mut seeds = 2;
+    let mut seeds = 1;
     let mut out = None;
     let mut chosen: Vec<Case> = Vec::new();
     while let Some(argument) = arguments.next() {
@@ -32,11 +31,7 @@ fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
                 seeds = count.parse().map_err(|_| format!("--seeds {count}: expected a number"))?;
             }
             "--out" => out = Some(value("a page")?),
-            name => {
-                let effect = Effect::from_name(name)
-                    .ok_or_else(|| format!("no effect `{name}`; see pleiad effects"))?;
-                chosen.extend(cases_of(effect));
-            }
+            name => chosen.extend(cases_named(name)?),
         }
     }
     if chosen.is_empty() {

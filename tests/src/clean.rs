@@ -22,7 +22,7 @@ pub struct Group {
     change: fn(&mut Scenario),
 }
 
-/// The hundred: fixed before any result was looked at.
+/// The hundred: fixed before any result was looked at, but for how many are long (`docs/benchmarks/clean.md`).
 pub const HUNDRED: [Group; 4] = [
     group("differential drive, 300 s, 3 robots", 1..=60, "manoeuvres"),
     group("differential drive, 1500 s, 5 robots", 61..=70, "manoeuvres_long"),

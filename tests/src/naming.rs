@@ -59,8 +59,13 @@ fn judged(effect: Effect, robots: &[u32], found: &Findings) -> Told {
         let untestable = found.untestable.iter().any(|one| one.effect == info.name);
         // Two effects that together are the same as this one, as is said.
         let said = format!("cannot be told from {} ", info.name);
+        if let Some(note) = found.notes.iter().find(|note| note.contains(&said)) {
+            let part = |own: &&Finding| own.effect.as_deref().is_some_and(|effect| note.contains(effect));
+            let extra = found.findings.iter().filter(|own| !part(own)).map(told).collect();
+            let rivals = found.findings.iter().filter(part).map(told).collect();
+            return Told { fate: Fate::InSet, rivals, extra };
+        }
         let fate = match (all.is_empty(), untestable) {
-            _ if found.notes.iter().any(|note| note.contains(&said)) => Fate::InSet,
             (true, true) => Fate::Untestable,
             (true, false) => Fate::Missed,
             (false, _) => Fate::Wrong,

@@ -63,8 +63,10 @@ pub(crate) fn plots(
     plots
 }
 
-/// Of a series whose noise changes with the driving: so that noise alone has the size of one sigma.
+/// Of a series whose noise changes with the driving: so that noise alone has the size of one sigma. Bearings of
+/// something else than their name says have no sigma.
 fn root_mean_square(sigmas: impl Iterator<Item = f64>) -> f64 {
+    let sigmas = sigmas.filter(|sigma| sigma.is_finite());
     let (sum, count) = sigmas.fold((0.0, 0_usize), |(sum, count), sigma| (sum + sigma * sigma, count + 1));
     (sum / count.max(1) as f64).sqrt()
 }
@@ -120,4 +122,15 @@ fn gain(
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::root_mean_square;
+
+    #[test]
+    fn what_has_no_sigma_does_not_widen_the_band_of_the_rest() {
+        let band = root_mean_square([3.0, f64::INFINITY, 4.0].into_iter());
+        assert!((band - 12.5_f64.sqrt()).abs() < 1e-15, "{band}");
+    }
 }

@@ -38,8 +38,18 @@ pub fn cases() -> Vec<Case> {
     Effect::ALL.iter().flat_map(|&effect| cases_of(effect)).collect()
 }
 
+/// The cases of the effect of this name.
+///
+/// # Errors
+///
+/// No effect has the name.
+pub fn cases_named(name: &str) -> Result<Vec<Case>, String> {
+    let effect = Effect::from_name(name).ok_or_else(|| format!("no effect `{name}`; see pleiad effects"))?;
+    Ok(cases_of(effect))
+}
+
 /// The cases of an effect at its typical size: one, but for a dead band, which is of the speed or of a wheel.
-pub fn cases_of(effect: Effect) -> Vec<Case> {
+fn cases_of(effect: Effect) -> Vec<Case> {
     let scenario = Scenario::from_toml(SCENARIO, "manoeuvres.toml").expect("a shipped scenario");
     let mut values = effect.typical_values();
     for (value, parameter) in values.iter_mut().zip(effect.info().parameters) {

@@ -15,7 +15,7 @@ use std::thread;
 use pleiad_mismatch::{KnownFit, fit_known};
 use pleiad_sim_peers::simulate;
 
-pub use cases::{Case, ROBOT, cases, cases_of};
+pub use cases::{Case, ROBOT, cases, cases_named};
 pub use exceptions::{EXCEPTIONS, Exception};
 pub use outcome::{Outcome, Row};
 pub use table::{rows, table};
