@@ -5,7 +5,6 @@ use pleiad_physics::chain::actuator::ActuatorState;
 use pleiad_physics::predict::{CommandWindow, wheel_turns};
 use pleiad_physics::{Pose, RobotModel, Scalar};
 
-use crate::agitation::agitation;
 use crate::channel::Channel;
 use crate::evidence::Evidence;
 use crate::plan::Plan;
@@ -114,7 +113,6 @@ pub(crate) fn residuals<S: Scalar>(
     let mut channel = ChannelResiduals::planned(Channel::Actuator, plan);
     let mut schedule = Schedule::new(model, &track.commands);
     let mut state = ActuatorState::default();
-    let mut changes = agitation(track, plan, model).into_iter();
     for own in &plan.items {
         if let Some(before) = &own.before {
             wheel_turns(model, schedule.within(before), before, &mut state);
@@ -130,8 +128,7 @@ pub(crate) fn residuals<S: Scalar>(
         let [left, right] = [0, 1].map(|wheel| -predicted[wheel] + measured[wheel]);
         let middle_s = f64::midpoint(own.window.from_s, own.window.to_s);
         let values = [(left + right) * 0.5, right - left];
-        let residual = Residual::new(middle_s, own.regime, None, &values, &[]);
-        channel.push(residual.with_du_squared(changes.next().unwrap_or_default()));
+        channel.push(Residual::new(middle_s, own.regime, None, &values, &[]));
     }
     channel
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use pleiad_estimation::RobotId;
 use pleiad_physics::chain::body::BodyState;
-use pleiad_physics::predict::{BodyWindow, EncoderSample, truth_change};
+use pleiad_physics::predict::{BodyWindow, truth_change};
 use pleiad_physics::{Pose, RobotModel, Scalar, Surroundings};
 
 use crate::channel::Channel;
@@ -32,8 +32,6 @@ pub(crate) struct Motion {
     /// The true pose at the beginning.
     pub(crate) start: Pose<f64>,
     pub(crate) surroundings: Surroundings,
-    /// Where the nearest other robot is at every sample of the window.
-    partner_m: Vec<Option<[f64; 2]>>,
     /// The last of those reference poses, seen from the first.
     pub(crate) measured: Pose<f64>,
 }
@@ -54,7 +52,7 @@ impl Motion {
             ends: [self.window.first, self.window.last].map(|end| end - self.reach.start),
             start: self.start,
             surroundings: self.surroundings,
-            partner_m: &self.partner_m,
+            partner_m: track.partner_m.get(self.window.first..=self.window.last).unwrap_or_default(),
         };
         truth_change(model, &window, self.stamps_s, state)
     }
@@ -94,24 +92,11 @@ pub(crate) fn plan_of_length(evidence: &Evidence<'_>, robot: RobotId, length_s: 
             stamps_s: [first.0, last.0],
             start,
             surroundings: evidence.surroundings(robot, middle_s, Some(start.position())),
-            partner_m: partner(evidence, robot, track, &window),
             measured: first.1.between(&last.1),
         });
         joined = Some(window.last);
     }
     plan
-}
-
-/// The nearest other robot, sample by sample.
-fn partner(evidence: &Evidence<'_>, robot: RobotId, track: &Track, window: &Window) -> Vec<Option<[f64; 2]>> {
-    if evidence.tracks.len() < 2 {
-        return Vec::new();
-    }
-    let at = |sample: &EncoderSample| {
-        let own = track.truth_at(sample.time_s)?;
-        evidence.surroundings(robot, sample.time_s, Some(own.position())).partner_m
-    };
-    track.encoders[window.first..=window.last].iter().map(at).collect()
 }
 
 /// Change of the true pose over a window minus the roll-out of the encoders.

@@ -68,6 +68,10 @@ impl Channel {
         Self::BearingToRobot,
     ];
 
+    /// Range and bearing of landmarks, range and bearing of robots.
+    pub(crate) const SIGHTINGS: [[Self; 2]; 2] =
+        [[Self::RangeToLandmark, Self::BearingToLandmark], [Self::RangeToRobot, Self::BearingToRobot]];
+
     /// Its name, as files and tables have it.
     pub const fn name(self) -> &'static str {
         match self {

@@ -9,8 +9,9 @@ use crate::builtin;
 use crate::channel::Channel;
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
+use crate::plan::Plan;
 use crate::residual::{ChannelResiduals, Omission};
-use crate::sightings::{self, Part};
+use crate::sightings;
 use crate::summary::{MIN_RESIDUALS, Summary, summarize};
 use crate::{actuator, body, commanded, gyro, sensors};
 
@@ -25,6 +26,38 @@ pub fn residuals<S: Scalar>(
     Channel::ALL.iter().map(|&channel| residuals_of(evidence, robot, model, channel)).collect()
 }
 
+/// The residuals of several channels of a robot under a model, in their order. Range and bearing of a sighting are
+/// predicted together.
+pub(crate) fn residuals_of_several<S: Scalar>(
+    evidence: &Evidence<'_>,
+    robot: RobotId,
+    model: &RobotModel<S>,
+    channels: &[Channel],
+) -> Vec<ChannelResiduals<S>> {
+    let mut bearings = None;
+    let one = |&channel: &Channel| match bearings.take() {
+        Some(ChannelResiduals { channel: own, rows, omissions }) if own == channel => {
+            ChannelResiduals { channel, rows, omissions }
+        }
+        _ => {
+            let pair = Channel::SIGHTINGS.into_iter().find(|pair| pair[0] == channel);
+            let pair = pair.filter(|pair| channels.contains(&pair[1]));
+            let Some((pair, (track, plans))) = pair.zip(evidence.prepared(robot)) else {
+                return residuals_of(evidence, robot, model, channel);
+            };
+            let [own, other] = sightings::residuals(
+                evidence,
+                pair,
+                (track, pair.map(|channel| plans.of_sightings(channel))),
+                model,
+            );
+            bearings = Some(other);
+            own
+        }
+    };
+    channels.iter().map(one).collect()
+}
+
 /// The residuals of one channel of a robot under a model.
 pub fn residuals_of<S: Scalar>(
     evidence: &Evidence<'_>,
@@ -35,8 +68,6 @@ pub fn residuals_of<S: Scalar>(
     let Some((track, plans)) = evidence.prepared(robot) else {
         return ChannelResiduals::without(channel, Omission::NotRecorded("robot"));
     };
-    let [to_landmark, of_landmark, to_robot, of_robot] = &plans.sightings;
-    let seen = |part, plan| sightings::residuals(evidence, (channel, part), (track, plan), model);
     match channel {
         Channel::Actuator => actuator::residuals(track, &plans.actuator, model),
         Channel::Body => body::residuals(track, &plans.body, model),
@@ -47,19 +78,23 @@ pub fn residuals_of<S: Scalar>(
         Channel::Gyro => gyro::residuals(&plans.gyro, model),
         Channel::Gps => sensors::gps(track, &plans.gps, model),
         Channel::Heading => sensors::heading(track, &plans.heading, model),
-        Channel::RangeToLandmark => seen(Part::Range, to_landmark),
-        Channel::BearingToLandmark => seen(Part::Bearing, of_landmark),
-        Channel::RangeToRobot => seen(Part::Range, to_robot),
-        Channel::BearingToRobot => seen(Part::Bearing, of_robot),
+        Channel::RangeToLandmark | Channel::RangeToRobot => {
+            let plans = [plans.of_sightings(channel), &Plan::new()];
+            let [own, _] = sightings::residuals(evidence, [channel, channel], (track, plans), model);
+            own
+        }
+        Channel::BearingToLandmark | Channel::BearingToRobot => {
+            let plans = [&Plan::new(), plans.of_sightings(channel)];
+            let [_, own] = sightings::residuals(evidence, [channel, channel], (track, plans), model);
+            own
+        }
     }
 }
 
-/// What [`Residual::du_squared`](crate::Residual::du_squared) is of the windows of the wheels under a model.
-pub(crate) fn agitation_of(
-    evidence: &Evidence<'_>,
-    robot: RobotId,
-    model: &RobotModel<f64>,
-) -> Vec<[f64; 2]> {
+/// For every residual of the channel [`Channel::Actuator`] the sum of the squared changes of speed that single
+/// commands make in its window, of the mean of both wheels and of right minus left, (rad/s)^2: commands that
+/// come at random times add the variance of those times multiplied by this.
+pub fn command_agitation(evidence: &Evidence<'_>, robot: RobotId, model: &RobotModel<f64>) -> Vec<[f64; 2]> {
     evidence.prepared(robot).map_or_else(Vec::new, |(track, plans)| agitation(track, &plans.actuator, model))
 }
 

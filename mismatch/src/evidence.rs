@@ -7,6 +7,7 @@ use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_physics::{RobotModel, Surroundings};
 use pleiad_recording::{Recording, RobotRecording, effect_epoch};
 
+use crate::channel::Channel;
 use crate::plan::Plan;
 use crate::track::Track;
 use crate::{actuator, body, commanded, gyro, sensors, sightings};
@@ -32,6 +33,14 @@ pub(crate) struct Plans {
     pub(crate) sightings: [Plan<sightings::Sighted>; 4],
 }
 
+impl Plans {
+    /// Of a channel of sightings.
+    pub(crate) fn of_sightings(&self, channel: Channel) -> &Plan<sightings::Sighted> {
+        let position = Channel::SIGHTINGS.as_flattened().iter().position(|own| *own == channel);
+        &self.sightings[position.unwrap_or(0)]
+    }
+}
+
 impl<'a> Evidence<'a> {
     /// Prepares the robots that have a model. The models' geometry carries truth from its own stamps to
     /// those of the other channels.
@@ -40,7 +49,11 @@ impl<'a> Evidence<'a> {
         let track = |(&robot, model): (&RobotId, &RobotModel<f64>)| {
             Some((robot, Track::new(recording.robots.get(&robot)?, model, origin)))
         };
-        let tracks = models.iter().filter_map(track).collect();
+        let mut tracks: BTreeMap<RobotId, Track> = models.iter().filter_map(track).collect();
+        let partners: Vec<_> = tracks.keys().map(|&robot| partners(&tracks, robot)).collect();
+        for (track, partner_m) in tracks.values_mut().zip(partners) {
+            track.partner_m = partner_m;
+        }
         let mut evidence = Self { recording, tracks, plans: BTreeMap::new(), origin };
         evidence.plans = evidence.tracks.keys().map(|&robot| (robot, evidence.plans_of(robot))).collect();
         evidence
@@ -93,6 +106,23 @@ impl<'a> Evidence<'a> {
         });
         Surroundings { partner_m, ..Surroundings::default() }
     }
+}
+
+/// The nearest other robot at every sample of a robot's wheels.
+fn partners(tracks: &BTreeMap<RobotId, Track>, robot: RobotId) -> Vec<Option<[f64; 2]>> {
+    let Some(own) = tracks.get(&robot).filter(|_| tracks.len() > 1) else { return Vec::new() };
+    let stamps = || own.encoders.iter().map(|sample| sample.time_s);
+    let places = own.positions_at(stamps());
+    let mut nearest: Vec<Option<[f64; 2]>> = vec![None; places.len()];
+    for (_, other) in tracks.iter().filter(|(other, _)| **other != robot) {
+        for ((place, best), there) in places.iter().zip(&mut nearest).zip(other.positions_at(stamps())) {
+            let (Some(place), Some(there)) = (place, there) else { continue };
+            if best.is_none_or(|best| squared_distance(there, *place) < squared_distance(best, *place)) {
+                *best = Some(there);
+            }
+        }
+    }
+    nearest
 }
 
 fn squared_distance([x, y]: [f64; 2], [own_x, own_y]: [f64; 2]) -> f64 {

@@ -36,7 +36,9 @@ mod windows;
 
 pub use builtin::models;
 pub use channel::{Channel, Component, MAX_COMPONENTS};
-pub use compare::{ChannelComparison, RobotComparison, compare, end_to_end, residuals, residuals_of};
+pub use compare::{
+    ChannelComparison, RobotComparison, command_agitation, compare, end_to_end, residuals, residuals_of,
+};
 pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, diagnose};
 pub use diagnosis::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known};
 pub use error::MismatchError;

@@ -33,7 +33,6 @@ pub struct Residual<S> {
     pub target: Option<Target>,
     values: [S; MAX_COMPONENTS],
     sigmas: [S; MAX_COMPONENTS],
-    du_squared: [f64; MAX_COMPONENTS],
     components: usize,
 }
 
@@ -52,7 +51,6 @@ impl<S: Scalar> Residual<S> {
             target,
             values: [S::zero(); MAX_COMPONENTS],
             sigmas: [S::one(); MAX_COMPONENTS],
-            du_squared: [0.0; MAX_COMPONENTS],
             components: values.len().min(MAX_COMPONENTS),
         };
         for (slot, &value) in own.values.iter_mut().zip(values) {
@@ -62,12 +60,6 @@ impl<S: Scalar> Residual<S> {
             *slot = sigma;
         }
         own
-    }
-
-    /// The same with the squared changes of its set-points.
-    pub(crate) fn with_du_squared(mut self, [mean, difference]: [f64; 2]) -> Self {
-        (self.du_squared[0], self.du_squared[1]) = (mean, difference);
-        self
     }
 
     /// The values in the order of the channel's components.
@@ -80,13 +72,6 @@ impl<S: Scalar> Residual<S> {
     /// model declares.
     pub fn sigmas(&self) -> &[S] {
         &self.sigmas[..self.components]
-    }
-
-    /// For the channel [`Channel::Actuator`], per component, the sum of the squared changes of speed that
-    /// single commands make in the window, (rad/s)^2: a command that comes at a random time adds the variance
-    /// of that time multiplied by this. Zero in the other channels.
-    pub fn du_squared(&self) -> &[f64] {
-        &self.du_squared[..self.components]
     }
 
     fn is_finite(&self) -> bool {

@@ -6,6 +6,7 @@ use pleiad_physics::{Pose, RobotModel, Scalar};
 
 use crate::commanded::Driver;
 use crate::evidence::Evidence;
+use crate::plan::Plan;
 use crate::{body, commanded};
 
 /// The horizons over which predictions are usually judged, seconds.
@@ -32,34 +33,62 @@ pub fn rollouts(
     model: &RobotModel<f64>,
     horizons_s: &[f64],
 ) -> Vec<Vec<Rollout>> {
-    let over = |&horizon_s: &f64| {
-        if horizon_s > 0.0 { over_horizon(evidence, robot, model, horizon_s) } else { Vec::new() }
-    };
-    horizons_s.iter().map(over).collect()
+    Planned::new(evidence, robot, horizons_s).rollouts(evidence, robot, model)
 }
 
-fn over_horizon(
-    evidence: &Evidence<'_>,
-    robot: RobotId,
-    model: &RobotModel<f64>,
-    horizon_s: f64,
-) -> Vec<Rollout> {
-    let Some((_, track)) = evidence.robot(robot) else { return Vec::new() };
-    if track.encoders.is_empty() {
-        let plan = commanded::plan(evidence, robot, horizon_s);
-        let mut driver = Driver::new(track, model);
-        let one = |own: &commanded::Motion| {
-            end_error(own.window.from_s, &own.measured, &driver.predicted(model, own))
+/// The windows of roll-outs over several horizons: they depend on no model.
+pub(crate) struct Planned(Vec<Over>);
+
+/// Windows by the encoders, or without encoders by the commands.
+enum Over {
+    Encoders(Plan<body::Motion>),
+    Commands(Plan<commanded::Motion>),
+    Nothing,
+}
+
+impl Planned {
+    pub(crate) fn new(evidence: &Evidence<'_>, robot: RobotId, horizons_s: &[f64]) -> Self {
+        let by_commands = evidence.robot(robot).is_none_or(|(_, track)| track.encoders.is_empty());
+        let over = |&horizon_s: &f64| {
+            if horizon_s.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+                Over::Nothing
+            } else if by_commands {
+                Over::Commands(commanded::plan(evidence, robot, horizon_s))
+            } else {
+                Over::Encoders(body::plan_of_length(evidence, robot, horizon_s))
+            }
         };
-        return plan.items.iter().map(one).collect();
+        Self(horizons_s.iter().map(over).collect())
     }
-    let plan = body::plan_of_length(evidence, robot, horizon_s);
-    let mut state = BodyState::default();
-    let one = |own: &body::Motion| {
-        let from_s = track.encoders[own.window.first].time_s;
-        end_error(from_s, &own.measured, &own.predicted(track, model, &mut state))
-    };
-    plan.items.iter().map(one).collect()
+
+    /// Per horizon.
+    pub(crate) fn rollouts(
+        &self,
+        evidence: &Evidence<'_>,
+        robot: RobotId,
+        model: &RobotModel<f64>,
+    ) -> Vec<Vec<Rollout>> {
+        let Some((_, track)) = evidence.robot(robot) else { return vec![Vec::new(); self.0.len()] };
+        let over = |over: &Over| match over {
+            Over::Nothing => Vec::new(),
+            Over::Commands(plan) => {
+                let mut driver = Driver::new(track, model);
+                let one = |own: &commanded::Motion| {
+                    end_error(own.window.from_s, &own.measured, &driver.predicted(model, own))
+                };
+                plan.items.iter().map(one).collect()
+            }
+            Over::Encoders(plan) => {
+                let mut state = BodyState::default();
+                let one = |own: &body::Motion| {
+                    let from_s = track.encoders[own.window.first].time_s;
+                    end_error(from_s, &own.measured, &own.predicted(track, model, &mut state))
+                };
+                plan.items.iter().map(one).collect()
+            }
+        };
+        self.0.iter().map(over).collect()
+    }
 }
 
 fn end_error(time_s: f64, measured: &Pose<f64>, predicted: &Pose<f64>) -> Rollout {

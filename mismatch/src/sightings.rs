@@ -4,7 +4,7 @@ use pleiad_estimation::sample::{Reading, Relative, Target};
 use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_physics::chain::sensors::{self as chain, Seen};
 use pleiad_physics::predict::{self, Instant, Path};
-use pleiad_physics::{Context, Effect, RobotModel, Scalar, signal};
+use pleiad_physics::{Context, Effect, Pose, RobotModel, Scalar, signal};
 
 use crate::channel::Channel;
 use crate::evidence::Evidence;
@@ -18,6 +18,8 @@ pub(crate) struct Sighted {
     pub(crate) at: At,
     pub(crate) target: Target,
     pub(crate) seen: Seen,
+    /// Of a robot that is seen, where its path begins in the map, by the truth near this instant.
+    target_path: Option<Pose<f64>>,
     /// Metres or radians.
     pub(crate) measured: f64,
 }
@@ -51,11 +53,17 @@ pub(crate) fn plans(evidence: &Evidence<'_>, robot: RobotId) -> [Plan<Sighted>; 
         let time_s = evidence.seconds(sample.time);
         let at = At::new(evidence, robot, track, time_s).ok_or(Missing::Truth(robot));
         let seen = seen(evidence, target, time_s);
+        let target_path = match target {
+            Target::Robot(robot) => evidence.tracks.get(&robot).and_then(|track| track.map_from_path(time_s)),
+            Target::Landmark(_) => None,
+        };
         for (index, measured) in measured {
             recorded[index] = true;
             let plan = &mut plans[index];
             match (&at, &seen) {
-                (Ok(at), &Ok(seen)) => plan.items.push(Sighted { at: at.clone(), target, seen, measured }),
+                (Ok(at), &Ok(seen)) => {
+                    plan.items.push(Sighted { at: at.clone(), target, seen, target_path, measured });
+                }
                 (Err(Missing::Truth(whose)), _) | (_, Err(Missing::Truth(whose))) => {
                     plan.count(|count| Omission::NoTruth(*whose, count));
                 }
@@ -92,39 +100,84 @@ pub(crate) fn seen(evidence: &Evidence<'_>, target: Target, time_s: f64) -> Resu
     }
 }
 
-/// What of a sighting a channel compares.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
-    Range,
-    Bearing,
-}
-
+/// Ranges and bearings of one kind of target. A sighting that has both is predicted once.
 pub(crate) fn residuals<S: Scalar>(
     evidence: &Evidence<'_>,
-    (channel, part): (Channel, Part),
-    (track, plan): (&Track, &Plan<Sighted>),
+    [range, bearing]: [Channel; 2],
+    (track, [ranges, bearings]): (&Track, [&Plan<Sighted>; 2]),
     model: &RobotModel<S>,
-) -> ChannelResiduals<S> {
-    let mut channel = ChannelResiduals::planned(channel, plan);
+) -> [ChannelResiduals<S>; 2] {
+    let mut all = [ChannelResiduals::planned(range, ranges), ChannelResiduals::planned(bearing, bearings)];
     let renamed = renames(model);
-    for own in &plan.items {
+    for (own, measured) in joined(&ranges.items, &bearings.items) {
         let at = &own.at;
-        let plain = at.instant(track);
+        let plain = at.plain();
         let other = renamed.then(|| actual(model, &plain, own.target)).filter(|other| *other != own.target);
         let other = other.and_then(|other| seen(evidence, other, at.time_s).ok());
-        let predicted = predicted(evidence, (track, at), other.as_ref().unwrap_or(&own.seen), model);
+        let predicted = match &other {
+            Some(other) => predicted(evidence, (track, at), other, model),
+            None => own.predicted(evidence, track, model),
+        };
         let context = Context {
             surroundings: plain.surroundings,
             ..Context::new(&model.nominal, plain.time_s, plain.motion.lift())
         };
         let noise = chain::noise(model, &context, predicted.range_m, predicted.bearing_rad);
-        let (value, sigma) = match part {
-            Part::Range => (-predicted.range_m + own.measured, noise.range_sigma_m),
-            Part::Bearing => ((-predicted.bearing_rad + own.measured).wrapped(), noise.bearing_sigma_rad),
-        };
-        channel.push(Residual::new(at.time_s, at.regime, Some(own.target), &[value], &[sigma]));
+        let values = [
+            measured[0].map(|range_m| (-predicted.range_m + range_m, noise.range_sigma_m)),
+            measured[1].map(|bearing_rad| {
+                ((-predicted.bearing_rad + bearing_rad).wrapped(), noise.bearing_sigma_rad)
+            }),
+        ];
+        for (channel, value) in all.iter_mut().zip(values) {
+            let Some((value, sigma)) = value else { continue };
+            channel.push(Residual::new(at.time_s, at.regime, Some(own.target), &[value], &[sigma]));
+        }
     }
-    channel
+    all
+}
+
+/// Sightings in the order of the record, with their range and bearing as far as they have them.
+pub(crate) fn joined<'s>(
+    ranges: &'s [Sighted],
+    bearings: &'s [Sighted],
+) -> Vec<(&'s Sighted, [Option<f64>; 2])> {
+    let mut all = Vec::with_capacity(ranges.len().max(bearings.len()));
+    // Both are in the order of the record; a sighting with both parts is in both.
+    let mut rest = bearings.iter().peekable();
+    for range in ranges {
+        while let Some(bearing) = rest.next_if(|own| own.at.time_s < range.at.time_s) {
+            all.push((bearing, [None, Some(bearing.measured)]));
+        }
+        let bearing = rest.next_if(|own| is_same(range, own)).map(|own| own.measured);
+        all.push((range, [Some(range.measured), bearing]));
+    }
+    all.extend(rest.map(|bearing| (bearing, [None, Some(bearing.measured)])));
+    all
+}
+
+#[allow(clippy::float_cmp, reason = "the same stamp")]
+fn is_same(range: &Sighted, bearing: &Sighted) -> bool {
+    range.target == bearing.target && range.at.time_s == bearing.at.time_s
+}
+
+impl Sighted {
+    /// What the robot reads of what it says it sees.
+    fn predicted<S: Scalar>(
+        &self,
+        evidence: &Evidence<'_>,
+        track: &Track,
+        model: &RobotModel<S>,
+    ) -> signal::Sighting<S> {
+        let path = match (self.target, self.target_path) {
+            (Target::Robot(robot), Some(map_from_path)) => {
+                evidence.tracks.get(&robot).map(|track| track.path_from(map_from_path))
+            }
+            _ => None,
+        };
+        let target = path.as_ref().map(|path| path as &dyn Path);
+        predict::sighting(model, &Instant { target, ..self.at.instant(track) }, &self.seen)
+    }
 }
 
 /// What a robot reads of a target: the reference pose is carried along its path, and a robot's along its own.

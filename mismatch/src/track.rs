@@ -41,6 +41,8 @@ pub(crate) struct Track {
     reckoning: Reckoning,
     /// Wheel radius and track width that the firmware believes, metres.
     pub(crate) geometry_m: [f64; 2],
+    /// Where the nearest other robot is at every sample of the wheels, metres in the map; empty without others.
+    pub(crate) partner_m: Vec<Option<[f64; 2]>>,
 }
 
 impl Track {
@@ -77,6 +79,7 @@ impl Track {
             commands: changes(commands),
             reckoning,
             geometry_m,
+            partner_m: Vec::new(),
         }
     }
 
@@ -160,10 +163,19 @@ impl Track {
 
     /// The path in the map, by the truth sample nearest to an instant.
     pub(crate) fn path_in_map(&self, time_s: f64) -> Option<PathInMap<'_>> {
+        self.map_from_path(time_s).map(|map_from_path| self.path_from(map_from_path))
+    }
+
+    /// Where the path begins in the map, by the truth sample nearest to an instant.
+    pub(crate) fn map_from_path(&self, time_s: f64) -> Option<Pose<f64>> {
         let (stamp_s, pose) = self.truth_near(time_s)?;
         let path_from_robot = self.reckoned_at(stamp_s)?.pose;
-        let map_from_path = pose.compose(&path_from_robot.between(&Pose::identity()));
-        Some(PathInMap { map_from_path, path: &self.reckoning })
+        Some(pose.compose(&path_from_robot.between(&Pose::identity())))
+    }
+
+    /// The path in the map if it begins here.
+    pub(crate) fn path_from(&self, map_from_path: Pose<f64>) -> PathInMap<'_> {
+        PathInMap { map_from_path, path: &self.reckoning }
     }
 
     /// The encoder samples around a window that join it without a pause, as far as a reference pose may have
@@ -206,6 +218,24 @@ impl Track {
             .filter_map(|index| self.truth.get(index))
             .min_by(|(a, _), (b, _)| (a - time_s).abs().total_cmp(&(b - time_s).abs()))?;
         ((nearest.0 - time_s).abs() <= TRUTH_REACH_S).then_some(*nearest)
+    }
+
+    /// True positions at increasing times, straight between the reference poses; `None` where truth has a gap.
+    pub(crate) fn positions_at(&self, times_s: impl Iterator<Item = f64>) -> Vec<Option<[f64; 2]>> {
+        let mut after = 0;
+        let at = |time_s: f64| {
+            while self.truth.get(after).is_some_and(|(stamp_s, _)| *stamp_s < time_s) {
+                after += 1;
+            }
+            let (next_s, next) = self.truth.get(after)?;
+            let (last_s, last) = self.truth[after.saturating_sub(1)];
+            let step_s = next_s - last_s;
+            let share = if step_s > 0.0 { ((time_s - last_s) / step_s).max(0.0) } else { 0.0 };
+            let known = step_s <= 2.0 * TRUTH_REACH_S && next_s - time_s <= 2.0 * TRUTH_REACH_S;
+            let [from, to] = [last.position(), next.position()];
+            known.then(|| [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis])))
+        };
+        times_s.map(at).collect()
     }
 
     /// The true pose at an instant: the truth sample with the nearest stamp, carried by the odometry.
@@ -404,6 +434,17 @@ mod tests {
         assert!((at(0.507) - (10.0 + 0.5 * 0.007)).abs() < 1e-9);
         assert!((at(0.513) - (20.0 - 0.5 * 0.007)).abs() < 1e-9);
         assert!(track.truth_at(0.7).is_none(), "no truth within reach");
+    }
+
+    #[test]
+    fn positions_lie_between_reference_poses_and_in_no_gap() {
+        let track = track((9.0, 9.0), &[(0.5, 10.0), (0.6, 20.0), (1.5, 30.0)]);
+        let found = track.positions_at([0.2, 0.45, 0.5, 0.55, 1.0, 1.5, 1.6].into_iter());
+        let expected = [None, Some(10.0), Some(10.0), Some(15.0), None, None, None];
+        for (found, expected) in found.iter().zip(expected) {
+            let x_m = found.map(|[x_m, _]| x_m);
+            assert!(x_m.zip(expected).map_or(x_m == expected, |(a, b)| (a - b).abs() < 1e-9), "{x_m:?}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ mod common;
 
 use common::{SIGMAS, recorded};
 use pleiad_estimation::RobotId;
-use pleiad_mismatch::{Channel, Evidence, end_to_end, models, residuals_of};
+use pleiad_mismatch::{Channel, Evidence, command_agitation, end_to_end, models, residuals_of};
 use pleiad_physics::{ActiveEffect, Effect, RobotModel, Scalar, Variable};
 use pleiad_recording::Recording;
 
@@ -110,7 +110,9 @@ fn a_window_is_agitated_by_what_it_changes_with_the_stamp_of_each_command() {
     let evidence = Evidence::new(&recording, &[(ROBOT, model.clone())].into());
     let found = residuals_of(&evidence, ROBOT, &model, Channel::Actuator);
     let commands = &recording.robots[&ROBOT].commands;
-    for row in found.rows.iter().skip(40).step_by(230) {
+    let agitation = command_agitation(&evidence, ROBOT, &model);
+    assert_eq!(agitation.len(), found.rows.len());
+    for (row, agitation) in found.rows.iter().zip(agitation).skip(40).step_by(230) {
         let mut expected = [0.0; 2];
         for (index, command) in commands.iter().enumerate() {
             // The window is 0.2 s long and the servo forgets in 0.25 s.
@@ -123,7 +125,7 @@ fn a_window_is_agitated_by_what_it_changes_with_the_stamp_of_each_command() {
                 expected[part] += ((late[part] - early[part]) / (2.0 * h)).powi(2);
             }
         }
-        for (found, expected) in row.du_squared().iter().zip(expected) {
+        for (found, expected) in agitation.iter().zip(expected) {
             assert!((found - expected).abs() < 0.01 * expected, "{row:?} {expected}");
         }
     }

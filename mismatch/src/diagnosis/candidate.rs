@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use pleiad_physics::{Effect, Region, Variable};
+use pleiad_physics::{Effect, Region};
 
-use crate::channel::Channel;
-use crate::diagnosis::fit::{State, residuals};
+use crate::diagnosis::fit::State;
+use crate::diagnosis::linearize::{Request, linearized};
+use crate::diagnosis::select::Entry;
 use crate::diagnosis::starts::{Placing, Start, onsets, regions, starts};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::touch::touches;
@@ -79,39 +80,52 @@ impl Candidate {
     }
 }
 
-/// Linearizes an effect at all its starts beside the terms of a hypothesis. Starts that show nowhere are left
-/// out; parameters that do not show stay at their values.
+/// Linearizes entries at all their starts beside the terms of a hypothesis: candidates by entry. Starts that show
+/// nowhere are left out; parameters that do not show stay at their values.
 pub(crate) fn candidates(
-    effect: Effect,
-    whose: Whose,
+    entries: &[Entry],
     units: &[&Unit<'_>],
     terms: &[Term],
     states: &[State],
-) -> Vec<Candidate> {
-    let own: Vec<usize> = (0..units.len()).filter(|&unit| acts(whose, units[unit])).collect();
-    let acting: Vec<&Unit<'_>> = own.iter().map(|&unit| units[unit]).collect();
-    let placing = Placing::of(effect.info());
-    let linearized = |start: &Start| {
-        let term = Term::new(effect, whose, start.values.clone());
-        let columns: Vec<Vec<Column>> =
-            own.iter().map(|&unit| linearized(units[unit], &term, start, terms, &states[unit])).collect();
-        shown(term, start, &own, columns)
+) -> Vec<Vec<Candidate>> {
+    let own = |(_, whose): Entry| -> Vec<usize> {
+        (0..units.len()).filter(|&unit| acts(whose, units[unit])).collect()
     };
-    let mut found = Vec::new();
-    for mut start in starts(effect, &acting) {
-        if !placing.is_some() {
-            found.extend(linearized(&start));
-            continue;
+    let acting = |entry: Entry| -> Vec<&Unit<'_>> { own(entry).iter().map(|&unit| units[unit]).collect() };
+    let mut owners = Vec::new();
+    let mut requests = Vec::new();
+    for (owner, &entry) in entries.iter().enumerate() {
+        let placing = Placing::of(entry.0.info());
+        for Start { mut values, along } in starts(entry.0, &acting(entry)) {
+            placing.widen(&mut values);
+            requests.push(Request { term: Term::new(entry.0, entry.1, values), along });
+            owners.push(owner);
         }
-        placing.widen(&mut start.values);
-        if let Some(everywhere) = linearized(&start) {
-            found.extend(placed(&everywhere, placing, &acting));
-        } else if let Some(onset) = placing.onset {
-            for time_s in largest(effect, &own, units, states) {
-                start.values[onset] = time_s;
-                found.extend(linearized(&start));
+    }
+    let mut found: Vec<Vec<Candidate>> = vec![Vec::new(); entries.len()];
+    // An impulse shows only if it is at an instant that was recorded.
+    let (mut instant_owners, mut instants) = (Vec::new(), Vec::new());
+    let columns = linearized(units, terms, states, &requests);
+    for ((owner, request), columns) in owners.into_iter().zip(&requests).zip(columns) {
+        let entry = entries[owner];
+        let placing = Placing::of(entry.0.info());
+        match (shown(request, columns), placing.onset) {
+            (Some(candidate), _) if !placing.is_some() => found[owner].push(candidate),
+            (Some(everywhere), _) => found[owner].extend(placed(&everywhere, placing, &acting(entry))),
+            (None, Some(onset)) => {
+                for time_s in largest(entry.0, &own(entry), units, states) {
+                    let mut term = request.term.clone();
+                    term.values[onset] = time_s;
+                    instants.push(Request { term, along: request.along.clone() });
+                    instant_owners.push(owner);
+                }
             }
+            (None, None) => {}
         }
+    }
+    let columns = linearized(units, terms, states, &instants);
+    for ((owner, request), columns) in instant_owners.into_iter().zip(&instants).zip(columns) {
+        found[owner].extend(shown(request, columns));
     }
     found
 }
@@ -174,46 +188,23 @@ fn acts(whose: Whose, unit: &Unit<'_>) -> bool {
     }
 }
 
-fn linearized(unit: &Unit<'_>, term: &Term, start: &Start, terms: &[Term], state: &State) -> Vec<Column> {
-    let channels = |channel: Channel| touches(term.effect, channel);
-    if start.along.is_empty() {
-        let mut all = terms.to_vec();
-        all.push(term.clone());
-        let Some(there) = residuals(unit, &all, &channels, Some(&state.residuals)) else {
-            return vec![Column::empty(unit)];
-        };
-        let part = |stretch: &Stretch| {
-            let range = stretch.range();
-            let difference: Vec<f64> =
-                there[range.clone()].iter().zip(&state.residuals[range]).map(|(a, b)| a - b).collect();
-            difference.iter().any(|value| *value != 0.0).then_some(difference)
-        };
-        return vec![Column { parts: unit.stretches.iter().map(part).collect() }];
-    }
-    let mut model = unit.model(terms);
-    let index = model.effects.len();
-    model.effects.push(term.active());
-    let variables: Vec<Variable> =
-        start.along.iter().map(|&parameter| Variable::Effect { index, parameter }).collect();
-    unit.columns(&model, &variables, &|_, channel| channels(channel))
-}
-
 /// Keeps the columns that show somewhere.
-fn shown(mut term: Term, start: &Start, own: &[usize], columns: Vec<Vec<Column>>) -> Option<Candidate> {
-    let count = columns.first()?.len();
+fn shown(request: &Request, columns: Vec<(usize, Vec<Column>)>) -> Option<Candidate> {
+    let mut term = request.term.clone();
+    let (_, first) = columns.first()?;
     let shows: Vec<bool> =
-        (0..count).map(|index| columns.iter().any(|columns| !columns[index].is_zero())).collect();
+        (0..first.len()).map(|index| columns.iter().any(|(_, columns)| !columns[index].is_zero())).collect();
     if !shows.contains(&true) {
         return None;
     }
-    for (&parameter, &shows) in start.along.iter().zip(&shows) {
+    for (&parameter, &shows) in request.along.iter().zip(&shows) {
         term.free[parameter] = term.free[parameter] && shows;
     }
     let along =
-        start.along.iter().zip(&shows).filter(|(_, shows)| **shows).map(|(index, _)| *index).collect();
-    let keep = |columns: Vec<Column>| -> Vec<Column> {
-        columns.into_iter().zip(&shows).filter(|(_, shows)| **shows).map(|(column, _)| column).collect()
+        request.along.iter().zip(&shows).filter(|(_, shows)| **shows).map(|(index, _)| *index).collect();
+    let keep = |(unit, columns): (usize, Vec<Column>)| {
+        let kept = columns.into_iter().zip(&shows).filter(|(_, shows)| **shows).map(|(column, _)| column);
+        (unit, Arc::new(kept.collect()))
     };
-    let base = own.iter().copied().zip(columns.into_iter().map(keep).map(Arc::new)).collect();
-    Some(Candidate { term, along, base, masked: false })
+    Some(Candidate { term, along, base: columns.into_iter().map(keep).collect(), masked: false })
 }

@@ -113,24 +113,37 @@ pub(crate) fn fit(
     effort: Effort,
 ) -> Option<Fit> {
     let states = states(units, &terms)?;
-    Some(fit_from(units, terms, states, movable, effort))
+    Some(fit_from(units, terms, states, movable, effort, &|_| None))
 }
 
-/// The same from what the units look like under the terms.
+/// The same from what the units look like under the terms. Parameters that `known` has columns of, by unit, keep
+/// them: they are hardly moved.
 pub(crate) fn fit_from(
     units: &[&Unit<'_>],
     terms: Vec<Term>,
     states: Vec<State>,
     movable: &dyn Fn(usize) -> bool,
     effort: Effort,
+    known: &dyn Fn(Slot) -> Option<Vec<Column>>,
 ) -> Fit {
     let (mut terms, mut states) = (terms, states);
     let mut slots = free_slots(&terms, movable);
-    let mut found = all_columns(units, &terms, &slots);
+    let mut open: Vec<bool> = Vec::with_capacity(slots.len());
+    let mut found: Vec<Vec<Column>> = vec![Vec::with_capacity(slots.len()); units.len()];
+    for &slot in &slots {
+        let kept = known(slot);
+        open.push(kept.is_none());
+        let kept = kept.unwrap_or_else(|| units.iter().map(|unit| Column::empty(unit)).collect());
+        for (columns, own) in found.iter_mut().zip(kept) {
+            columns.push(own);
+        }
+    }
+    linearize(units, &terms, &slots, &open, &mut found);
     // What shows nowhere cannot be fitted.
     let shows: Vec<bool> =
         (0..slots.len()).map(|slot| found.iter().any(|columns| !columns[slot].is_zero())).collect();
     keep(&mut slots, &shows);
+    keep(&mut open, &shows);
     for columns in &mut found {
         keep(columns, &shows);
     }
@@ -147,7 +160,7 @@ pub(crate) fn fit_from(
             state.residuals = residuals;
         }
         if step.gain > RELINEARIZE {
-            found = all_columns(units, &terms, &slots);
+            linearize(units, &terms, &slots, &open, &mut found);
         }
         if step.gain < effort.converged {
             break;
@@ -227,8 +240,15 @@ fn keep<T>(items: &mut Vec<T>, which: &[bool]) {
     items.retain(|_| which.next().copied().unwrap_or(true));
 }
 
-fn all_columns(units: &[&Unit<'_>], terms: &[Term], slots: &[Slot]) -> Vec<Vec<Column>> {
-    units.iter().map(|unit| columns(unit, terms, slots)).collect()
+/// Puts the columns of the slots that are open in their places.
+fn linearize(units: &[&Unit<'_>], terms: &[Term], slots: &[Slot], open: &[bool], found: &mut [Vec<Column>]) {
+    let places: Vec<usize> = (0..slots.len()).filter(|&position| open[position]).collect();
+    let own: Vec<Slot> = places.iter().map(|&position| slots[position]).collect();
+    for (unit, known) in units.iter().zip(found) {
+        for (&position, column) in places.iter().zip(columns(unit, terms, &own)) {
+            known[position] = column;
+        }
+    }
 }
 
 /// Columns of all slots for a unit; those of terms that do not act on it are empty.

@@ -130,7 +130,7 @@ pub fn fit_known(
 /// An effect where the likelihood is greatest beside a fit, of all its starts.
 fn found(units: &[&Unit<'_>], current: &Fit, effect: Effect, whose: Whose) -> Option<Term> {
     let whites = whites(units, current);
-    let candidates = candidates(effect, whose, units, &current.terms, &current.states);
+    let candidates = candidates(&[(effect, whose)], units, &current.terms, &current.states).concat();
     let mut scored: Vec<Scored> =
         candidates.iter().filter_map(|candidate| score(units, &whites, candidate)).collect();
     scored.sort_by(|a, b| b.step.gain.total_cmp(&a.step.gain));

@@ -13,6 +13,7 @@ mod fit;
 mod held_out;
 mod known;
 mod lag;
+mod linearize;
 mod naming;
 mod noise;
 mod parallel;

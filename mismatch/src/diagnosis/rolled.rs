@@ -13,7 +13,7 @@ use crate::diagnosis::run::{Judgement, Prepared};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::findings::{RobotRollOuts, RollOut};
-use crate::rollout::{HORIZONS_S, Rollout, rollouts};
+use crate::rollout::{HORIZONS_S, Planned, Rollout};
 
 /// The parameters that anyone would refit first: those of the nominal model that move a predicted pose.
 const REFITTED: [Effect; 2] = [Effect::WheelRadiusError, Effect::TrackWidthError];
@@ -42,19 +42,19 @@ pub(crate) fn robots(roller: &Roller<'_, '_>, kept: &[Term]) -> BTreeMap<RobotId
     robots.sort_unstable();
     robots.dedup();
     let rolled = parallel::map(&robots, |&robot| {
-        let own: Vec<&Unit<'_>> = roller.units.iter().copied().filter(|unit| unit.robot == robot).collect();
         let mine: Vec<Term> = kept.iter().filter(|term| term.acts_on(robot)).cloned().collect();
-        let nominal = sums(roller, &own, None);
+        let own = Rolling::new(roller, robot);
+        let nominal = own.sums(None);
         let mut refitted = BTreeMap::new();
         let without = mine.iter().map(|term| term.effect).filter(|effect| REFITTED.contains(effect));
         for without in [None].into_iter().chain(without.map(Some)) {
-            refitted.insert(without, sums(roller, &own, refit(&own, robot, without).as_ref()));
+            refitted.insert(without, own.sums(refit(&own.fitted, robot, without).as_ref()));
         }
         let movable: Vec<bool> = mine.iter().map(|term| term.whose == Whose::Robot(robot)).collect();
         let corrected = if mine.is_empty() {
             nominal.clone()
         } else {
-            sums(roller, &own, fit(&own, mine, &|index| movable[index], Effort::RIVAL).as_ref())
+            own.sums(fit(&own.fitted, mine, &|index| movable[index], Effort::RIVAL).as_ref())
         };
         Rolled { nominal, corrected, refitted }
     });
@@ -71,31 +71,53 @@ fn refit(units: &[&Unit<'_>], robot: RobotId, without: Option<Effect>) -> Option
     fit(units, terms, &|_| true, Effort::RIVAL)
 }
 
-/// Sums of roll-outs under a fit, or under the nominal model: on the recordings to test on, or else fold by
-/// fold with the fit of the rest.
-fn sums(roller: &Roller<'_, '_>, own: &[&Unit<'_>], fit: Option<&Fit>) -> Sums {
-    let mut sums = vec![[0.0; 3]; HORIZONS_S.len()];
-    let robot = own.first().map(|unit| unit.robot);
-    let tests: Vec<&Unit<'_>> =
-        roller.tests.iter().copied().filter(|unit| Some(unit.robot) == robot).collect();
-    let roll = |unit: &Unit<'_>, model: &RobotModel<f64>| {
-        rollouts(&roller.prepared[unit.recording].evidence, unit.robot, model, &HORIZONS_S)
-    };
-    if !tests.is_empty() || fit.is_none_or(|fit| fit.slots.is_empty()) {
-        for unit in if tests.is_empty() { own } else { &tests } {
-            let model = fit.map_or_else(|| unit.nominal.clone(), |fit| unit.model(&fit.terms));
-            add(&mut sums, &roll(unit, &model), &|_| true);
-        }
-    } else if let Some(fit) = fit {
-        for number in 0..FOLDS {
-            let (terms, _) = left_out(own, fit, number);
-            for unit in own {
-                let within = fold(unit, number);
-                add(&mut sums, &roll(unit, &unit.model(&terms)), &|rollout| within.contains(&rollout.time_s));
+/// A robot to be rolled out: the windows are the same under every model.
+struct Rolling<'r, 'a> {
+    prepared: &'r [Prepared<'a>],
+    fitted: Vec<&'r Unit<'a>>,
+    /// Of the recordings to test on, or else of those fitted on.
+    rolled: Vec<(&'r Unit<'a>, Planned)>,
+    tested: bool,
+}
+
+impl<'r, 'a> Rolling<'r, 'a> {
+    fn new(roller: &Roller<'r, 'a>, robot: RobotId) -> Self {
+        let own = |units: &'r [&'r Unit<'a>]| -> Vec<&'r Unit<'a>> {
+            units.iter().copied().filter(|unit| unit.robot == robot).collect()
+        };
+        let (fitted, tests) = (own(roller.units), own(roller.tests));
+        let tested = !tests.is_empty();
+        let planned = |unit: &'r Unit<'a>| {
+            (unit, Planned::new(&roller.prepared[unit.recording].evidence, robot, &HORIZONS_S))
+        };
+        let rolled = if tested { tests } else { fitted.clone() }.into_iter().map(planned).collect();
+        Self { prepared: roller.prepared, fitted, rolled, tested }
+    }
+
+    /// Sums of roll-outs under a fit, or under the nominal model: on the recordings to test on, or else fold by
+    /// fold with the fit of the rest.
+    fn sums(&self, fit: Option<&Fit>) -> Sums {
+        let mut sums = vec![[0.0; 3]; HORIZONS_S.len()];
+        let roll = |unit: &Unit<'_>, planned: &Planned, model: &RobotModel<f64>| {
+            planned.rollouts(&self.prepared[unit.recording].evidence, unit.robot, model)
+        };
+        if self.tested || fit.is_none_or(|fit| fit.slots.is_empty()) {
+            for (unit, planned) in &self.rolled {
+                let model = fit.map_or_else(|| unit.nominal.clone(), |fit| unit.model(&fit.terms));
+                add(&mut sums, &roll(unit, planned, &model), &|_| true);
+            }
+        } else if let Some(fit) = fit {
+            for number in 0..FOLDS {
+                let (terms, _) = left_out(&self.fitted, fit, number);
+                for (unit, planned) in &self.rolled {
+                    let within = fold(unit, number);
+                    let kept = |rollout: &Rollout| within.contains(&rollout.time_s);
+                    add(&mut sums, &roll(unit, planned, &unit.model(&terms)), &kept);
+                }
             }
         }
+        sums
     }
-    sums
 }
 
 fn add(sums: &mut Sums, rollouts: &[Vec<Rollout>], kept: &dyn Fn(&Rollout) -> bool) {

@@ -99,9 +99,7 @@ impl Pool {
             .collect();
         let missing: Vec<Entry> =
             open.iter().copied().filter(|entry| !self.known.contains_key(entry)).collect();
-        let found = parallel::map(&missing, |&(effect, whose)| {
-            candidates(effect, whose, units, &current.terms, &current.states)
-        });
+        let found = candidates(&missing, units, &current.terms, &current.states);
         if self.known.is_empty() {
             self.terms = Some(current.terms.len());
         }
@@ -126,17 +124,20 @@ impl Pool {
         self.terms == Some(terms.len())
     }
 
-    /// Forgets candidates that added terms have changed much: a servo that answers later moves every effect
-    /// between command and wheel in time.
+    /// Forgets candidates that an added term has changed much.
     fn forget(&mut self, added: &Term) {
-        let later = |parameter: &Parameter| {
-            matches!(parameter.relevance, Relevance::Lag(_) | Relevance::CommandLag(_))
-        };
-        let later = added.parameters().iter().any(later);
+        let later = is_later(added);
         self.known.retain(|&(effect, whose), _| {
             !(later && overlap(added.whose, whose) && effect.info().channels.contains(&Needed::Command))
         });
     }
+}
+
+/// Whether an effect makes the servo answer later: that moves every effect between command and wheel in time.
+fn is_later(added: &Term) -> bool {
+    let later =
+        |parameter: &Parameter| matches!(parameter.relevance, Relevance::Lag(_) | Relevance::CommandLag(_));
+    added.parameters().iter().any(later)
 }
 
 pub(crate) fn overlap(a: Whose, b: Whose) -> bool {
@@ -273,7 +274,7 @@ fn joined(units: &[&Unit<'_>], whole: &Fit, part: &Fit) -> Option<Fit> {
     // The position in the whole of each term of the part.
     let mut place = Vec::with_capacity(part.terms.len());
     for term in &part.terms[..part.terms.len() - 1] {
-        let known = terms.iter().position(|own| own.effect == term.effect && own.whose == term.whose)?;
+        let known = terms.iter().position(|own| own.is_of(term))?;
         terms[known] = term.clone();
         place.push(known);
     }
@@ -318,8 +319,17 @@ pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Opti
     let known: Vec<State> = own.iter().map(|&unit| current.states[unit].clone()).collect();
     let states = with_another(&acting, &known, &terms)?;
     let movable = |index: usize| movable[index];
-    let fitted = fit_from(&acting, terms, states, &movable, Effort::RIVAL);
-    let added = fitted.terms.len() - 1;
+    let added = terms.len() - 1;
+    let later = is_later(&terms[added]);
+    let known = |(position, parameter): Slot| {
+        if position == added || later {
+            return None;
+        }
+        let whole = current.terms.iter().position(|own| own.is_of(&terms[position]))?;
+        let slot = current.slots.iter().position(|own| *own == (whole, parameter))?;
+        Some(own.iter().map(|&unit| current.columns[unit][slot].clone()).collect())
+    };
+    let fitted = fit_from(&acting, terms.clone(), states, &movable, Effort::RIVAL, &known);
     let threshold = |fit: &Fit, (term, parameter): Slot| {
         let own = &fit.terms[term];
         term == added && is_threshold(own, parameter) && is_on(own, parameter)

@@ -39,6 +39,11 @@ impl Term {
         }
     }
 
+    /// Whether it is of the same effect of the same robots.
+    pub(crate) fn is_of(&self, other: &Self) -> bool {
+        self.effect == other.effect && self.whose == other.whose
+    }
+
     pub(crate) fn active(&self) -> ActiveEffect<f64> {
         // The values are as many as the effect's parameters and no fit makes them NaN.
         ActiveEffect::new(self.effect, &self.values)

@@ -8,12 +8,12 @@ use pleiad_estimation::sample::Target;
 use pleiad_physics::{Dual, Floors, RobotModel, Scalar, Variable};
 
 use crate::channel::Channel;
-use crate::compare::{agitation_of, residuals_of};
+use crate::compare::{command_agitation, residuals_of, residuals_of_several};
 use crate::diagnosis::related::unrelated;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::evidence::Evidence;
-use crate::residual::{Omission, Regime};
+use crate::residual::{ChannelResiduals, Omission, Regime};
 
 /// Scores are summed over blocks of this length: longer than the correlation of what is not modelled,
 /// short enough for many blocks. Seconds.
@@ -101,7 +101,7 @@ pub(crate) struct Unit<'a> {
 }
 
 /// So many variables are differentiated by at once.
-const MOST_AT_ONCE: usize = 8;
+pub(crate) const MOST_AT_ONCE: usize = 8;
 /// An effect that no model has.
 const NO_VARIABLE: Variable = Variable::Effect { index: usize::MAX, parameter: 0 };
 
@@ -175,9 +175,16 @@ impl<'a> Unit<'a> {
                 for component in 0..components {
                     unit.rows.push(Row { time_s: row.time_s, regime: row.regime, target: row.target });
                     unit.scale_of.push(first_scale + component);
-                    unit.agitation.push(row.du_squared()[component] * jitter_sigma_s * jitter_sigma_s);
                 }
             }
+        }
+        unit.agitation = vec![0.0; unit.rows.len()];
+        if let Some(range) = unit.stretch(Channel::Actuator).map(Stretch::range)
+            && jitter_sigma_s > 0.0
+        {
+            let mut own = vec![0.0; range.len()];
+            unit.agitate(&mut own, &unit.nominal);
+            unit.agitation[range].copy_from_slice(&own);
         }
         let stamps = || unit.rows.iter().map(|row| row.time_s);
         let first_s = stamps().fold(f64::INFINITY, f64::min);
@@ -214,28 +221,60 @@ impl<'a> Unit<'a> {
             return Cow::Borrowed(&self.agitation);
         };
         let mut all = self.agitation.clone();
-        let changes = agitation_of(self.evidence, self.robot, &self.model(terms));
+        self.agitate(&mut all[stretch.range()], &self.model(terms));
+        Cow::Owned(all)
+    }
+
+    /// Writes the variances of the windows of the wheels under a model.
+    fn agitate(&self, into: &mut [f64], model: &RobotModel<f64>) {
+        let changes = command_agitation(self.evidence, self.robot, model);
         let variance = self.jitter_sigma_s * self.jitter_sigma_s;
-        for (element, change) in all[stretch.range()].iter_mut().zip(changes.into_iter().flatten()) {
+        for (element, change) in into.iter_mut().zip(changes.into_iter().flatten()) {
             *element = change * variance;
         }
-        Cow::Owned(all)
+    }
+
+    /// Positions of the stretches that hold something, those that are predicted together in one group.
+    pub(crate) fn groups(&self) -> Vec<Vec<usize>> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for (which, stretch) in self.stretches.iter().enumerate().filter(|(_, stretch)| stretch.rows > 0) {
+            let with = |group: &&mut Vec<usize>| {
+                let first = self.stretches[group[0]].channel;
+                Channel::SIGHTINGS.iter().any(|pair| pair.contains(&first) && pair.contains(&stretch.channel))
+            };
+            match groups.last_mut().filter(with) {
+                Some(group) => group.push(which),
+                None => groups.push(vec![which]),
+            }
+        }
+        groups
     }
 
     /// Residuals under a model; `None` for a channel in which a prediction is no finite number where the
     /// nominal one is.
     pub(crate) fn values(&self, model: &RobotModel<f64>, channels: &dyn Fn(Channel) -> bool) -> Values {
-        let stretch = |stretch: &Stretch| {
-            (stretch.rows > 0 && channels(stretch.channel)).then(|| self.evaluated(model, stretch)).flatten()
-        };
-        self.stretches.iter().map(stretch).collect()
+        let mut all = vec![None; self.stretches.len()];
+        for mut group in self.groups() {
+            group.retain(|&which| channels(self.stretches[which].channel));
+            let found = self.evaluated(model, &group);
+            for (which, values) in group.into_iter().zip(found) {
+                all[which] = values;
+            }
+        }
+        all
     }
 
-    fn evaluated<S: Scalar>(&self, model: &RobotModel<S>, stretch: &Stretch) -> Option<Vec<S>> {
-        let found = residuals_of(self.evidence, self.robot, model, stretch.channel);
-        let values: Vec<S> = found.rows.iter().flat_map(|row| row.values().iter().copied()).collect();
-        (found.rows.len() == stretch.rows && values.len() == stretch.rows * stretch.components)
-            .then_some(values)
+    /// Values of the stretches of a group.
+    fn evaluated<S: Scalar>(&self, model: &RobotModel<S>, group: &[usize]) -> Vec<Option<Vec<S>>> {
+        let channels: Vec<Channel> = group.iter().map(|&which| self.stretches[which].channel).collect();
+        let found = residuals_of_several(self.evidence, self.robot, model, &channels);
+        let values = |(found, &which): (ChannelResiduals<S>, &usize)| {
+            let stretch = &self.stretches[which];
+            let values: Vec<S> = found.rows.iter().flat_map(|row| row.values().iter().copied()).collect();
+            (found.rows.len() == stretch.rows && values.len() == stretch.rows * stretch.components)
+                .then_some(values)
+        };
+        found.into_iter().zip(group).map(values).collect()
     }
 
     /// Derivatives of the residuals with respect to variables of a model; those that `show` in no channel, by
@@ -247,44 +286,55 @@ impl<'a> Unit<'a> {
         show: &dyn Fn(usize, Channel) -> bool,
     ) -> Vec<Column> {
         let mut columns = vec![Column::empty(self); variables.len()];
-        for (which, stretch) in self.stretches.iter().enumerate().filter(|(_, stretch)| stretch.rows > 0) {
-            let own: Vec<usize> =
-                (0..variables.len()).filter(|&position| show(position, stretch.channel)).collect();
+        for group in self.groups() {
+            let shows = |position| group.iter().any(|&which| show(position, self.stretches[which].channel));
+            let own: Vec<usize> = (0..variables.len()).filter(|&position| shows(position)).collect();
             // Many at once: what the model predicts is the same for all, and most of the work.
             for positions in own.chunks(MOST_AT_ONCE) {
                 let now: Vec<Variable> = positions.iter().map(|&position| variables[position]).collect();
-                let parts = match now.len() {
-                    1 => self.batch::<1>(model, &now, stretch),
-                    2 => self.batch::<2>(model, &now, stretch),
-                    3 | 4 => self.batch::<4>(model, &now, stretch),
-                    _ => self.batch::<MOST_AT_ONCE>(model, &now, stretch),
-                };
-                for (&position, part) in positions.iter().zip(parts) {
-                    columns[position].parts[which] = part;
+                for (&position, parts) in positions.iter().zip(self.slopes(model, &now, &group)) {
+                    for (&which, part) in group.iter().zip(parts) {
+                        columns[position].parts[which] = part;
+                    }
                 }
             }
         }
         columns
     }
 
-    /// The derivatives of a stretch with respect to at most `P` variables; `None` for one that is zero or not
-    /// finite.
+    /// The derivatives of the stretches of a group with respect to at most [`MOST_AT_ONCE`] variables, by
+    /// variable, then stretch; `None` for what is zero or not finite.
+    pub(crate) fn slopes(
+        &self,
+        model: &RobotModel<f64>,
+        variables: &[Variable],
+        group: &[usize],
+    ) -> Vec<Values> {
+        match variables.len() {
+            1 => self.batch::<1>(model, variables, group),
+            2 => self.batch::<2>(model, variables, group),
+            3 | 4 => self.batch::<4>(model, variables, group),
+            _ => self.batch::<MOST_AT_ONCE>(model, variables, group),
+        }
+    }
+
     fn batch<const P: usize>(
         &self,
         model: &RobotModel<f64>,
         variables: &[Variable],
-        stretch: &Stretch,
-    ) -> Vec<Option<Vec<f64>>> {
+        group: &[usize],
+    ) -> Vec<Values> {
         let mut padded = [NO_VARIABLE; P];
         padded[..variables.len()].copy_from_slice(variables);
         let model: RobotModel<Dual<P>> = model.differentiated(&padded);
-        let Some(values) = self.evaluated(&model, stretch) else { return vec![None; variables.len()] };
-        let derivative = |index: usize| {
-            let part: Vec<f64> = values.iter().map(|value| value.derivatives()[index]).collect();
+        let values = self.evaluated(&model, group);
+        let derivative = |values: &Option<Vec<Dual<P>>>, index: usize| {
+            let part: Vec<f64> = values.as_ref()?.iter().map(|value| value.derivatives()[index]).collect();
             let shows = part.iter().all(|value| value.is_finite()) && part.iter().any(|value| *value != 0.0);
             shows.then_some(part)
         };
-        (0..variables.len()).map(derivative).collect()
+        let of_variable = |index| values.iter().map(|values| derivative(values, index)).collect();
+        (0..variables.len()).map(of_variable).collect()
     }
 }
 

@@ -13,11 +13,12 @@
 use pleiad_physics::chain::sensors::Seen;
 use pleiad_physics::{Effect, RobotModel};
 
+use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
 use crate::diagnosis::spread::scans::{
-    CHANNELS, Reading, Scan, actual, in_view, median_spread, predicted, scans, targets,
+    Reading, Scan, actual, in_view, median_spread, predicted, scans, targets,
 };
 use crate::diagnosis::unit::Unit;
 use crate::sensors::At;
@@ -94,7 +95,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit, displaced: f64) 
         let Some(nominal) = &unit.evidence.recording.nominal else { continue };
         probability = nominal.range_sensor.detection_probability;
         let model = unit.model(&fit.terms);
-        for kind in 0..CHANNELS.len() {
+        for kind in 0..Channel::SIGHTINGS.len() {
             collect(position, unit, &model, kind, &mut rows, &mut places);
         }
     }
@@ -177,7 +178,7 @@ fn collect(
             let reported = scan.is_some_and(named) || misnamed.iter().any(|own| near(own, seen));
             let regressors = [predicted.range_m, predicted.bearing_rad * predicted.bearing_rad];
             rows.push(Row { regressors, missed: !reported });
-            places.push(Place { unit: position, time_s, channel: CHANNELS[kind][0] });
+            places.push(Place { unit: position, time_s, channel: Channel::SIGHTINGS[kind][0] });
         }
     }
 }
@@ -201,7 +202,7 @@ fn spreads(unit: &Unit<'_>, model: &RobotModel<f64>, kind: usize, own: &[Scan<'_
 /// When the sensor looked, with what it saw of a kind.
 fn instants<'s, 'a>(unit: &Unit<'_>, own: &'s [Scan<'a>]) -> Vec<(f64, Option<&'s Scan<'a>>)> {
     let mut stamps: Vec<f64> =
-        (0..CHANNELS.len()).flat_map(|kind| scans(unit, kind)).map(|scan| scan.time_s).collect();
+        (0..Channel::SIGHTINGS.len()).flat_map(|kind| scans(unit, kind)).map(|scan| scan.time_s).collect();
     stamps.sort_by(f64::total_cmp);
     stamps.dedup();
     let rates = unit.evidence.recording.nominal.as_ref().and_then(|nominal| nominal.robots.get(&unit.robot));

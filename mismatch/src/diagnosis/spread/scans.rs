@@ -8,16 +8,10 @@ use pleiad_physics::{RobotModel, Scalar, signal};
 use crate::channel::Channel;
 use crate::diagnosis::unit::Unit;
 use crate::sensors::At;
-use crate::sightings::{self, Sighted, seen};
+use crate::sightings::{self, Sighted, joined, seen};
 
 /// The median size of a normal error times this is its standard deviation.
 const NORMAL_OVER_MEDIAN: f64 = 1.482_602_218_505_602;
-
-/// Landmarks, robots: the channels of their ranges and bearings.
-pub(super) const CHANNELS: [[Channel; 2]; 2] = [
-    [Channel::RangeToLandmark, Channel::BearingToLandmark],
-    [Channel::RangeToRobot, Channel::BearingToRobot],
-];
 
 /// A sighting.
 pub(super) struct Reading<'s> {
@@ -62,41 +56,18 @@ pub(super) struct Scan<'s> {
 /// The sightings of landmarks (kind 0) or robots (kind 1) that could be placed, by instant.
 pub(super) fn scans<'s>(unit: &'s Unit<'_>, kind: usize) -> Vec<Scan<'s>> {
     let Some((_, plans)) = unit.evidence.prepared(unit.robot) else { return Vec::new() };
-    let [ranges, bearings] = [0, 1].map(|part| plans.sightings[2 * kind + part].items.as_slice());
+    let [ranges, bearings] =
+        Channel::SIGHTINGS[kind].map(|channel| plans.of_sightings(channel).items.as_slice());
     let mut found: Vec<Scan<'s>> = Vec::new();
-    let mut push = |sighted: &'s Sighted, measured| {
+    for (sighted, measured) in joined(ranges, bearings) {
         let time_s = sighted.at.time_s;
         let reading = Reading { sighted, measured };
         match found.last_mut() {
             Some(scan) if scan.time_s >= time_s => scan.readings.push(reading),
             _ => found.push(Scan { time_s, readings: vec![reading] }),
         }
-    };
-    // Both are in the order of the record; a sighting with both parts is in both.
-    let mut rest = bearings;
-    for range in ranges {
-        let earlier = rest.partition_point(|own| own.at.time_s < range.at.time_s);
-        for bearing in &rest[..earlier] {
-            push(bearing, [None, Some(bearing.measured)]);
-        }
-        rest = &rest[earlier..];
-        match rest.first() {
-            Some(bearing) if is_same(range, bearing) => {
-                push(range, [Some(range.measured), Some(bearing.measured)]);
-                rest = &rest[1..];
-            }
-            _ => push(range, [Some(range.measured), None]),
-        }
-    }
-    for bearing in rest {
-        push(bearing, [None, Some(bearing.measured)]);
     }
     found
-}
-
-#[allow(clippy::float_cmp, reason = "the same stamp")]
-fn is_same(range: &Sighted, bearing: &Sighted) -> bool {
-    range.target == bearing.target && range.at.time_s == bearing.at.time_s
 }
 
 /// Everything of a kind whose place at an instant is known.
@@ -146,7 +117,7 @@ pub(super) fn repeats(units: &[&Unit<'_>]) -> bool {
         let named = |index: usize| scan.readings[index].sighted.target;
         (1..scan.readings.len()).any(|index| (0..index).any(|other| named(other) == named(index)))
     };
-    units.iter().any(|unit| (0..CHANNELS.len()).any(|kind| scans(unit, kind).iter().any(twice)))
+    units.iter().any(|unit| (0..Channel::SIGHTINGS.len()).any(|kind| scans(unit, kind).iter().any(twice)))
 }
 
 /// What a sighting is of under a model that may swap names.

@@ -14,11 +14,12 @@
 
 use pleiad_physics::{Effect, Floors, RobotModel};
 
+use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
-use crate::diagnosis::spread::scans::{CHANNELS, actual, in_view, median_spread, repeats, scans, targets};
+use crate::diagnosis::spread::scans::{actual, in_view, median_spread, repeats, scans, targets};
 use crate::diagnosis::unit::Unit;
 
 /// Parameters: the logarithms of the least sigma, of range and bearing, to landmarks and to robots.
@@ -246,7 +247,7 @@ fn collect(
     rows: &mut Vec<Row>,
     places: &mut Vec<Place>,
 ) {
-    for (kind, channels) in CHANNELS.into_iter().enumerate() {
+    for (kind, channels) in Channel::SIGHTINGS.into_iter().enumerate() {
         for scan in scans(unit, kind) {
             let targets = targets(unit, kind, scan.time_s);
             for own in &scan.readings {
