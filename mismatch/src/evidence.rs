@@ -8,6 +8,7 @@ use pleiad_physics::{RobotModel, Surroundings};
 use pleiad_recording::{Recording, RobotRecording, effect_epoch};
 
 use crate::channel::Channel;
+use crate::parallel;
 use crate::plan::Plan;
 use crate::track::Track;
 use crate::{actuator, body, commanded, gyro, sensors, sightings};
@@ -50,12 +51,14 @@ impl<'a> Evidence<'a> {
             Some((robot, Track::new(recording.robots.get(&robot)?, model, origin)))
         };
         let mut tracks: BTreeMap<RobotId, Track> = models.iter().filter_map(track).collect();
-        let partners: Vec<_> = tracks.keys().map(|&robot| partners(&tracks, robot)).collect();
+        let robots: Vec<RobotId> = tracks.keys().copied().collect();
+        let partners = parallel::map(&robots, |&robot| partners(&tracks, robot));
         for (track, partner_m) in tracks.values_mut().zip(partners) {
             track.partner_m = partner_m;
         }
         let mut evidence = Self { recording, tracks, plans: BTreeMap::new(), origin };
-        evidence.plans = evidence.tracks.keys().map(|&robot| (robot, evidence.plans_of(robot))).collect();
+        let plans = parallel::map(&robots, |&robot| evidence.plans_of(robot));
+        evidence.plans = robots.into_iter().zip(plans).collect();
         evidence
     }
 

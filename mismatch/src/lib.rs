@@ -22,6 +22,7 @@ mod evidence;
 mod findings;
 mod gyro;
 mod model;
+mod parallel;
 mod plan;
 mod reckoning;
 mod residual;

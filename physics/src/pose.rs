@@ -2,8 +2,40 @@
 
 use crate::scalar::Scalar;
 
-/// Below this angle the quotients come from their series; the first neglected term is below 1e-17.
-const SMALL_ANGLE_RAD: f64 = 1e-4;
+/// Up to this angle the quotients of the exponential map come from their series; the first neglected term is below
+/// 1e-18, that of their derivatives below 1e-16.
+const SERIES_UP_TO_RAD: f64 = 0.5;
+/// So many terms.
+const TERMS: usize = 8;
+/// Of `sin(a)/a` and of `(1 - cos(a))/a^2` in powers of `a^2`.
+const SIN: [f64; TERMS] = coefficients(1);
+const COS: [f64; TERMS] = coefficients(2);
+
+/// `(-1)^n / (2n + first)!`.
+const fn coefficients(first: u32) -> [f64; TERMS] {
+    let mut all = [0.0; TERMS];
+    let (mut n, mut factorial, mut last) = (0, 1.0, 1);
+    while n < TERMS {
+        while last < 2 * n as u32 + first {
+            last += 1;
+            factorial *= last as f64;
+        }
+        all[n] = if n % 2 == 0 { 1.0 / factorial } else { -1.0 / factorial };
+        n += 1;
+    }
+    all
+}
+
+/// A power series and its derivative.
+#[inline]
+fn series(coefficients: &[f64; TERMS], at: f64) -> (f64, f64) {
+    let (mut value, mut slope) = (0.0, 0.0);
+    for coefficient in coefficients.iter().rev() {
+        slope = slope * at + value;
+        value = value * at + coefficient;
+    }
+    (value, slope)
+}
 
 /// A pose or a rigid motion of SE(2): metres, metres, radians. The yaw is not wrapped, so that it can be
 /// differentiated and differenced.
@@ -40,13 +72,13 @@ impl<S: Scalar> Pose<S> {
 
     /// `R v`: a vector of this frame in the outer frame.
     pub fn rotate(&self, [x, y]: [S; 2]) -> [S; 2] {
-        let (sin, cos) = (self.yaw_rad.sin(), self.yaw_rad.cos());
+        let (sin, cos) = self.yaw_rad.sin_cos();
         [cos * x - sin * y, sin * x + cos * y]
     }
 
     /// `R' v`: a vector of the outer frame in this frame.
     pub fn rotate_back(&self, [x, y]: [S; 2]) -> [S; 2] {
-        let (sin, cos) = (self.yaw_rad.sin(), self.yaw_rad.cos());
+        let (sin, cos) = self.yaw_rad.sin_cos();
         [cos * x + sin * y, cos * y - sin * x]
     }
 
@@ -70,12 +102,15 @@ impl<S: Scalar> Pose<S> {
     /// The exponential map: the motion along a constant body velocity whose integral is
     /// `(forward, left, yaw)` (`sola2018micro`, eqs. 156 and 158).
     pub fn exp(forward_m: S, left_m: S, yaw_rad: S) -> Self {
-        let (a, b) = if yaw_rad.value().abs() < SMALL_ANGLE_RAD {
-            let square = yaw_rad * yaw_rad;
-            (S::one() - square / 6.0, yaw_rad * (S::constant(0.5) - square / 24.0))
+        let angle = yaw_rad.value();
+        let (a, b) = if angle.abs() < SERIES_UP_TO_RAD {
+            let square = angle * angle;
+            let (a, a_slope) = series(&SIN, square);
+            let (b, b_slope) = series(&COS, square);
+            (yaw_rad.chain(a, 2.0 * angle * a_slope), yaw_rad.chain(angle * b, b + 2.0 * square * b_slope))
         } else {
-            let half = (yaw_rad * 0.5).sin();
-            (yaw_rad.sin() / yaw_rad, half * half * 2.0 / yaw_rad)
+            let (sin, cos) = (yaw_rad * 0.5).sin_cos();
+            (sin * cos * 2.0 / yaw_rad, sin * sin * 2.0 / yaw_rad)
         };
         Self::new(a * forward_m - b * left_m, b * forward_m + a * left_m, yaw_rad)
     }
@@ -110,10 +145,14 @@ mod tests {
     #[test]
     fn the_exponential_is_smooth_across_the_switch_to_its_series() {
         let at = |angle| Pose::exp(Dual::<1>::constant(1.0), Dual::constant(0.5), Dual::variable(angle, 0));
-        let (below, above) = (at(0.999_999e-4), at(1.000_001e-4));
+        let (below, above) = (at(SERIES_UP_TO_RAD - 1e-15), at(SERIES_UP_TO_RAD));
         for (lower, upper) in [(below.x_m, above.x_m), (below.y_m, above.y_m)] {
-            assert!((lower.value() - upper.value()).abs() < 1e-9);
-            assert!((lower.derivatives()[0] - upper.derivatives()[0]).abs() < 1e-8);
+            assert!((lower.value() - upper.value()).abs() < 1e-14);
+            assert!((lower.derivatives()[0] - upper.derivatives()[0]).abs() < 1e-14);
         }
+        let nothing = at(0.0);
+        assert_eq!((nothing.x_m.value(), nothing.y_m.value()), (1.0, 0.5));
+        // x = sin(a)/a - (1 - cos(a))/a / 2, y = (1 - cos(a))/a + sin(a)/a / 2.
+        assert_eq!((nothing.x_m.derivatives()[0], nothing.y_m.derivatives()[0]), (-0.25, 0.5));
     }
 }

@@ -69,6 +69,13 @@ pub trait Scalar:
         self.chain(cos, -sin)
     }
 
+    /// Sine and cosine of an angle in radians, for the price of one.
+    #[inline]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = libm::sincos(self.value());
+        (self.chain(sin, cos), self.chain(cos, -sin))
+    }
+
     /// Tangent of an angle in radians.
     #[inline]
     fn tan(self) -> Self {

@@ -7,10 +7,10 @@ use pleiad_physics::Variable;
 
 use crate::channel::Channel;
 use crate::diagnosis::fit::{State, residuals};
-use crate::diagnosis::parallel;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Column, MOST_AT_ONCE, Stretch, Unit, Values};
+use crate::parallel;
 
 /// An effect at a start.
 pub(crate) struct Request {

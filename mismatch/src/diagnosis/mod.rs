@@ -16,7 +16,6 @@ mod lag;
 mod linearize;
 mod naming;
 mod noise;
-mod parallel;
 mod power;
 mod profile;
 mod refine;

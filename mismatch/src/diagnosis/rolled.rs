@@ -8,11 +8,11 @@ use pleiad_physics::{Effect, RobotModel};
 
 use crate::diagnosis::fit::{Effort, Fit, fit};
 use crate::diagnosis::held_out::{FOLDS, fold, left_out};
-use crate::diagnosis::parallel;
 use crate::diagnosis::run::{Judgement, Prepared};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::findings::{RobotRollOuts, RollOut};
+use crate::parallel;
 use crate::rollout::{HORIZONS_S, Planned, Rollout};
 
 /// The parameters that anyone would refit first: those of the nominal model that move a predicted pose.

@@ -14,7 +14,6 @@ use crate::diagnosis::fit::{Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
 use crate::diagnosis::lag::paired;
 use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, judge};
-use crate::diagnosis::parallel;
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
 use crate::diagnosis::select::{Entry, Pool, Selected, select};
@@ -26,6 +25,7 @@ use crate::diagnosis::unit::Unit;
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
 use crate::findings::{Estimate, Finding, Findings, HeldOut, Untestable, Verdict};
+use crate::parallel;
 
 /// The spread of a uniform distribution of length one.
 const UNIFORM_SIGMA: f64 = 0.288_675_134_594_812_9;

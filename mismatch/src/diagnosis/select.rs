@@ -8,12 +8,12 @@ use pleiad_physics::{Channel as Needed, Effect, Parameter, Relevance};
 use crate::diagnosis::candidate::{Candidate, candidates};
 use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::fit::{Effort, Fit, Slot, State, fit, fit_from, with_another};
-use crate::diagnosis::parallel;
 use crate::diagnosis::profile::{is_on, is_threshold, polish_some};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{Step, White, step};
+use crate::parallel;
 
 /// Probability that anything is found in a clean recording, over everything that is tried in it.
 pub(crate) const FAMILYWISE: f64 = 0.002;

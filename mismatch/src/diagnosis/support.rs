@@ -9,13 +9,13 @@ use crate::diagnosis::candidate::Candidate;
 use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::fit::{Effort, Fit, Slot, fit};
 use crate::diagnosis::naming::{Estimated, is_unseen, twin};
-use crate::diagnosis::parallel;
 use crate::diagnosis::profile::{is_on, polish_some};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::select::{Pool, Scored, covariance, fit_beside, overlap, score, whites};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{White, step};
+use crate::parallel;
 
 /// A rival explains the data about equally if it loses less than this, twice in log-likelihood: odds of 20.
 pub(crate) const ODDS: f64 = 5.991_464_547_107_98;

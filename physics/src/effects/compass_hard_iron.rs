@@ -32,7 +32,7 @@ impl EffectModel for CompassHardIron {
 
     fn heading<S: Scalar>(values: &[S], context: &Context<S>, signal: &mut HeadingReading<S>) {
         let (forward, left) = (values[0], values[1]);
-        let (sin, cos) = (context.heading_rad().sin(), context.heading_rad().cos());
+        let (sin, cos) = context.heading_rad().sin_cos();
         let across = forward * cos - left * sin;
         signal.heading_rad += across.atan2(forward * sin + left * cos + 1.0);
     }

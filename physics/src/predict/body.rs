@@ -54,10 +54,6 @@ impl<'a> BodyWindow<'a> {
         Self { track: samples, ends, start, surroundings, partner_m: &[] }
     }
 
-    fn samples(&self) -> &'a [EncoderSample] {
-        self.track.get(self.ends[0]..=self.ends[1]).unwrap_or_default()
-    }
-
     /// The stamps of the first and the last sample, seconds.
     pub fn stamps_s(&self) -> [f64; 2] {
         self.ends.map(|end| self.track.get(end).map_or(0.0, |sample| sample.time_s))
@@ -76,53 +72,49 @@ impl<'a> BodyWindow<'a> {
     fn step<S: Scalar>(
         &self,
         model: &RobotModel<S>,
-        [from, to]: [&EncoderSample; 2],
+        from: usize,
         pose: Pose<S>,
         state: &mut BodyState<S>,
     ) -> BodyIncrement<S> {
-        let turned = [0, 1].map(|wheel| S::constant(to.angle_rad[wheel] - from.angle_rad[wheel]));
-        let mut context = self.context(model, [from, to], pose);
+        let (before, after) = (&self.track[from], &self.track[from + 1]);
+        let turned = [0, 1].map(|wheel| S::constant(after.angle_rad[wheel] - before.angle_rad[wheel]));
+        let mut context = self.context(model, from, pose);
         // Effects of heading and place act as in the middle of the step.
         let (forward_m, yaw_rad) = nominal_motion(model, &context, turned);
         context.motion.pose = pose.compose(&Pose::exp(forward_m * 0.5, S::zero(), yaw_rad * 0.5));
         increment(model, &context, turned, state)
     }
 
-    fn context<'m, S: Scalar>(
-        &self,
-        model: &'m RobotModel<S>,
-        [from, to]: [&EncoderSample; 2],
-        pose: Pose<S>,
-    ) -> Context<'m, S> {
+    /// The step from a sample of the track to the next.
+    fn context<'m, S: Scalar>(&self, model: &'m RobotModel<S>, from: usize, pose: Pose<S>) -> Context<'m, S> {
+        let partner_m = self.partner_at(from);
+        let (from, to) = (&self.track[from], &self.track[from + 1]);
         let mut motion = Motion::at_rest(pose);
         // An encoder shows the last tick passed: the wheel is half a tick beyond, on average.
         let ticks = model.nominal.encoder_ticks_per_rev;
         let half_tick_rad = if ticks > 0.0 { S::constant(PI) / ticks } else { S::zero() };
         motion.wheel_angle_rad = from.angle_rad.map(|angle_rad| half_tick_rad + angle_rad);
         let steer_rad = f64::midpoint(from.steer_rad, to.steer_rad);
-        let partner_m = self.partner_at(from.time_s);
         Context {
             surroundings: Surroundings { steer_rad, partner_m, ..self.surroundings },
             ..Context::new(&model.nominal, from.time_s, motion).over(S::constant(to.time_s - from.time_s))
         }
     }
 
-    /// Where the nearest robot is in the middle of the step that begins at this stamp.
-    fn partner_at(&self, from_s: f64) -> Option<[f64; 2]> {
-        let last = self.partner_m.len().checked_sub(1);
-        let Some(last) = last else { return self.surroundings.partner_m };
-        let begun = self.samples().partition_point(|sample| sample.time_s <= from_s);
-        let at = |index: usize| self.partner_m[index.min(last)];
-        let (from, to) = (at(begun.saturating_sub(1))?, at(begun)?);
+    /// Where the nearest robot is in the middle of the step that begins at a sample of the track.
+    fn partner_at(&self, from: usize) -> Option<[f64; 2]> {
+        let Some(last) = self.partner_m.len().checked_sub(1) else { return self.surroundings.partner_m };
+        let at = |index: usize| self.partner_m[index.saturating_sub(self.ends[0]).min(last)];
+        let (from, to) = (at(from)?, at(from + 1)?);
         Some([0, 1].map(|axis| f64::midpoint(from[axis], to[axis])))
     }
 
     /// By how much more than evenly the robot has driven in the middle of the step that begins at a sample,
     /// times four: forward, left (metres), yaw (radians). The wheels speed up as from the step before to the
     /// step after; without those they do not.
-    fn bend<S: Scalar>(&self, model: &RobotModel<S>, from: usize) -> [S; 3] {
+    fn bend<S: Scalar>(&self, model: &RobotModel<S>, index: usize) -> [S; 3] {
         let none = [S::zero(); 3];
-        let samples = from.checked_sub(1).and_then(|first| self.track.get(first..from + 3));
+        let samples = index.checked_sub(1).and_then(|first| self.track.get(first..index + 3));
         let Some([before, from, to, after]) = samples else { return none };
         let spans_s = [from.time_s - before.time_s, to.time_s - from.time_s, after.time_s - to.time_s];
         if spans_s.iter().any(|span_s| *span_s <= 0.0) {
@@ -134,7 +126,7 @@ impl<'a> BodyWindow<'a> {
             let rate_after = (after.angle_rad[wheel] - to.angle_rad[wheel]) / spans_s[2];
             S::constant(-0.5 * spans_s[1] * spans_s[1] * (rate_after - rate_before) / reach_s)
         });
-        let context = self.context(model, [from, to], Pose::identity());
+        let context = self.context(model, index, Pose::identity());
         let (forward_m, yaw_rad) = nominal_motion(model, &context, bent);
         [forward_m, S::zero(), yaw_rad]
     }
@@ -158,11 +150,12 @@ fn roll_out<S: Scalar>(
     let start: Pose<S> = Pose::constant(window.start.x_m, window.start.y_m, window.start.yaw_rad);
     let before = *state;
     let mut motion = Motion::at_rest(start);
-    for pair in window.samples().windows(2) {
-        if pair[1].time_s <= pair[0].time_s {
+    let last = window.ends[1].min(window.track.len().saturating_sub(1));
+    for from in window.ends[0]..last {
+        if window.track[from + 1].time_s <= window.track[from].time_s {
             continue;
         }
-        let step = window.step(model, [&pair[0], &pair[1]], motion.pose, state);
+        let step = window.step(model, from, motion.pose, state);
         motion.pose = step.applied_to(&motion.pose);
         motion.speed_m_s = step.speed_m_s;
         motion.yaw_rate_rad_s = step.yaw_rate_rad_s;
@@ -227,17 +220,19 @@ fn carried<S: Scalar>(
     let mut rest_s = ahead_s;
     let forth = ahead_s.value() >= 0.0;
     let sense = if forth { 1.0 } else { -1.0 };
-    let mut last: Option<[usize; 2]> = None;
+    // The first sample of the step taken last.
+    let mut last: Option<usize> = None;
     loop {
         let next = if forth { at.checked_add(1) } else { at.checked_sub(1) };
         let Some((next, there)) = next.and_then(|next| Some((next, window.track.get(next)?))) else {
-            let behind = if forth { at.checked_sub(1).map(|from| [from, at]) } else { Some([at, at + 1]) };
-            let samples =
-                last.or(behind).and_then(|[from, to]| Some([window.track.get(from)?, window.track.get(to)?]));
-            return match samples {
-                Some([from, to]) if to.time_s > from.time_s => {
-                    let step = window.step(model, [from, to], pose, &mut state);
-                    let share = rest_s / (to.time_s - from.time_s);
+            let from = last.or(if forth { at.checked_sub(1) } else { Some(at) });
+            let lasted_s = |from: usize| {
+                Some((from, window.track.get(from + 1)?.time_s - window.track.get(from)?.time_s))
+            };
+            return match from.and_then(lasted_s) {
+                Some((from, lasted_s)) if lasted_s > 0.0 => {
+                    let step = window.step(model, from, pose, &mut state);
+                    let share = rest_s / lasted_s;
                     let driven = step.driven.map(|part| part * share);
                     driven_from(&pose, driven, &step.added.share(share))
                 }
@@ -247,16 +242,16 @@ fn carried<S: Scalar>(
         let here = &window.track[at];
         let step_s = (there.time_s - here.time_s).abs();
         if step_s > 0.0 {
-            let ends = if forth { [here, there] } else { [there, here] };
-            let step = window.step(model, ends, pose, &mut state);
+            let from = at.min(next);
+            let step = window.step(model, from, pose, &mut state);
             let part_s = rest_s * sense;
             if part_s.value() < step_s {
                 let share = part_s / step_s;
-                let bend = window.bend(model, at.min(next));
+                let bend = window.bend(model, from);
                 let curve = share * (S::one() - share) * sense;
                 let driven = [0, 1, 2].map(|part| step.driven[part] * share + bend[part] * curve);
                 // What happens at an instant is in this part of the step or not.
-                let mut context = window.context(model, ends, pose);
+                let mut context = window.context(model, from, pose);
                 context.time_s = if forth { here.time_s } else { here.time_s - part_s.value() };
                 context.step_s = part_s;
                 let added = added(model, &context);
@@ -271,7 +266,7 @@ fn carried<S: Scalar>(
             } else {
                 driven_to(&pose, step.driven, &step.added)
             };
-            last = Some([at.min(next), at.max(next)]);
+            last = Some(from);
             rest_s -= S::constant(sense * step_s);
         }
         at = next;

@@ -31,12 +31,12 @@ use crate::diagnosis::entries::Entries;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::held_out::Gain;
 use crate::diagnosis::naming::Judged;
-use crate::diagnosis::parallel;
 use crate::diagnosis::select::Entry;
 use crate::diagnosis::spread::family::{Family, Shows};
 use crate::diagnosis::term::Whose;
 use crate::diagnosis::unit::Unit;
 use crate::findings::{Undetected, Untestable};
+use crate::parallel;
 
 pub(crate) use known::{is_of_spread, known, known_swap};
 pub(crate) use swap::{Swaps, swaps};
