@@ -47,6 +47,12 @@ impl Student {
 }
 
 impl Student {
+    /// By how much the log-density of an error of `z` scales grows with the logarithm of the scale.
+    pub(super) fn slope(self, z: f64) -> f64 {
+        let square = z * z;
+        (1.0 + self.reciprocal) * square / (1.0 + self.reciprocal * square) - 1.0
+    }
+
     /// Of two errors of so many scales each, by the product of the scales: with half the logarithms.
     pub(super) fn log_density_of_two(self, [a, b]: [f64; 2], scales: f64) -> f64 {
         let constant = 2.0 * (self.constant - HALF_LOG_TAU) - libm::log(scales);

@@ -32,6 +32,12 @@ pub(super) trait Density: Sync {
     /// The block in time of each row: their scores are summed before they are squared.
     fn blocks(&self) -> &[usize];
     fn fill(&self, parameters: &[f64], into: &mut [f64]);
+
+    /// The derivatives of every row's log-density with respect to the parameters `free`; `None` for those that
+    /// are to be differenced.
+    fn scores(&self, _parameters: &[f64], free: &[usize]) -> Vec<Option<Vec<f64>>> {
+        vec![None; free.len()]
+    }
 }
 
 /// Where an ascent ended.
@@ -253,7 +259,15 @@ fn scores_at(
 ) -> Vec<Vec<f64>> {
     let mut moved = parameters.to_vec();
     let (mut above, mut below) = (vec![0.0; density.rows()], vec![0.0; density.rows()]);
-    let one = |&index: &usize| {
+    let one = |(&index, known): (&usize, Option<Vec<f64>>)| {
+        if let Some(mut scores) = known {
+            for (row, score) in scores.iter_mut().enumerate() {
+                if !(kept(row) && score.is_finite()) {
+                    *score = 0.0;
+                }
+            }
+            return scores;
+        }
         let (value, own) = (parameters[index], bounds[index]);
         let reach = reach(value, &own);
         let (high, low) = ((value + reach).min(own.high), (value - reach).max(own.low));
@@ -265,7 +279,7 @@ fn scores_at(
         let slope = |row: usize| if kept(row) { (above[row] - below[row]) / (high - low) } else { 0.0 };
         (0..above.len()).map(slope).map(|slope| if slope.is_finite() { slope } else { 0.0 }).collect()
     };
-    free.iter().map(one).collect()
+    free.iter().zip(density.scores(parameters, free)).map(one).collect()
 }
 
 fn sums(scores: &[Vec<f64>]) -> DVector<f64> {

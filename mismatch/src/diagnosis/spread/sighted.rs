@@ -68,6 +68,11 @@ impl Sightings {
     }
 }
 
+/// By how much the log-density of errors grows with the logarithms of the two sigmas.
+fn slopes(errors: &[Option<f64>; 2], sigmas: [f64; 2], student: Student) -> [f64; 2] {
+    [0, 1].map(|part| errors[part].map_or(0.0, |error| student.slope(error / sigmas[part])))
+}
+
 /// Of the errors of a range and a bearing, where they are there.
 fn log_density(errors: &[Option<f64>; 2], sigmas: [f64; 2], student: Student) -> f64 {
     if let [Some(range), Some(bearing)] = *errors {
@@ -102,6 +107,57 @@ impl Density for Sightings {
                 *value = log_sum(own + *value, other + others - libm::log(row.choices as f64));
             }
         }
+    }
+
+    /// All but the tails' in closed form.
+    fn scores(&self, parameters: &[f64], free: &[usize]) -> Vec<Option<Vec<f64>>> {
+        let closed = |index: &usize| (*index != TAILS).then(|| vec![0.0; self.rows.len()]);
+        let mut all: Vec<Option<Vec<f64>>> = free.iter().map(closed).collect();
+        let student = Student::new(parameters[TAILS]);
+        let mixed = self.kept * libm::exp(parameters[MIXED]);
+        let (own, other) = (libm::log1p(-mixed), libm::log(mixed));
+        let bases = [0, 1].map(|kind| [0, 1].map(|part| libm::exp(parameters[BASE + 2 * kind + part])));
+        for (index, row) in self.rows.iter().enumerate() {
+            let sigmas = Self::sigmas(row, &bases, parameters);
+            let mut slope = slopes(&row.errors, sigmas, student);
+            let mut of_mixed = 0.0;
+            if row.choices > 0 && mixed > 0.0 {
+                let named = own + log_density(&row.errors, sigmas, student);
+                let each: Vec<f64> =
+                    row.others.iter().map(|errors| log_density(errors, sigmas, student)).collect();
+                let share = other - libm::log(row.choices as f64);
+                let others = each.iter().copied().fold(f64::NEG_INFINITY, log_sum) + share;
+                let total = log_sum(named, others);
+                let weight = libm::exp(named - total);
+                slope = slope.map(|slope| weight * slope);
+                for (errors, log_density) in row.others.iter().zip(each) {
+                    let weight = libm::exp(log_density + share - total);
+                    let own = slopes(errors, sigmas, student);
+                    slope = [0, 1].map(|part| slope[part] + weight * own[part]);
+                }
+                of_mixed = libm::exp(others - total) - weight * mixed / (1.0 - mixed);
+            }
+            let base = bases[row.kind];
+            // A sigma that is held at its least share grows with its base alone.
+            let held = [0, 1].map(|part| sigmas[part] <= LEAST_SIGMA * base[part]);
+            let relative =
+                |part: usize, by: f64| if held[part] { 0.0 } else { slope[part] * by / sigmas[part] };
+            for (&parameter, scores) in free.iter().zip(&mut all) {
+                let Some(scores) = scores else { continue };
+                scores[index] = match parameter {
+                    LINEAR => relative(0, row.range_m),
+                    SQUARE => relative(0, row.range_m * row.range_m),
+                    BLUR => relative(1, row.yaw_rate_rad_s.abs()),
+                    MIXED => of_mixed,
+                    _ if parameter / 2 == row.kind => {
+                        let part = parameter % 2;
+                        if held[part] { slope[part] } else { relative(part, base[part]) }
+                    }
+                    _ => 0.0,
+                };
+            }
+        }
+        all
     }
 }
 
@@ -276,6 +332,66 @@ fn collect(
                 });
                 let channel = channels[usize::from(own.measured[0].is_none())];
                 places.push(Place { unit: position, time_s: scan.time_s, channel });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scores_in_closed_form_are_central_differences() {
+        let row = |kind, range_m, yaw_rate_rad_s, errors, others, choices| Row {
+            kind,
+            range_m,
+            yaw_rate_rad_s,
+            errors,
+            others,
+            choices,
+        };
+        let rows = vec![
+            row(0, 2.0, 0.3, [Some(0.04), Some(-0.01)], vec![[Some(0.5), Some(0.02)]], 2),
+            row(
+                0,
+                4.0,
+                -1.2,
+                [Some(0.4), Some(0.05)],
+                vec![[Some(-0.03), Some(0.0)], [Some(0.1), Some(0.1)]],
+                3,
+            ),
+            row(1, 1.0, 0.0, [None, Some(0.03)], vec![], 1),
+            row(1, 3.0, 0.7, [Some(-0.2), None], vec![], 0),
+            // A sigma that shrinks with range is held at its least.
+            row(1, 90.0, 0.7, [Some(0.001), Some(0.01)], vec![], 0),
+        ];
+        let blocks = vec![0; rows.len()];
+        let sightings = Sightings { rows, blocks, kept: 0.5 };
+        let free: Vec<usize> = (0..9).collect();
+        for tails in [0.0, 0.2] {
+            let mut parameters = vec![-3.0, -4.0, -2.5, -3.5, 0.004, -0.0012, 0.01, tails, -2.0];
+            let scores = sightings.scores(&parameters, &free);
+            for &index in &free {
+                let Some(scores) = &scores[index] else {
+                    assert_eq!(index, TAILS);
+                    continue;
+                };
+                let h = 1e-6;
+                let (value, mut at) = (parameters[index], [vec![0.0; 5], vec![0.0; 5]]);
+                for (into, sign) in at.iter_mut().zip([1.0, -1.0]) {
+                    parameters[index] = value + sign * h;
+                    sightings.fill(&parameters, into);
+                }
+                parameters[index] = value;
+                for row in 0..5 {
+                    let expected = (at[0][row] - at[1][row]) / (2.0 * h);
+                    let found = scores[row];
+                    assert!(
+                        (found - expected).abs() < 1e-5 * expected.abs().max(1.0),
+                        "{index} {row} {found} {expected}"
+                    );
+                }
             }
         }
     }
