@@ -11,16 +11,14 @@ const TERMS: usize = 8;
 const SIN: [f64; TERMS] = coefficients(1);
 const COS: [f64; TERMS] = coefficients(2);
 
-/// `(-1)^n / (2n + first)!`.
-const fn coefficients(first: u32) -> [f64; TERMS] {
+/// `(-1)^n / (2n + first)!`; `first` is 1 or 2, its own factorial.
+const fn coefficients(first: u16) -> [f64; TERMS] {
     let mut all = [0.0; TERMS];
-    let (mut n, mut factorial, mut last) = (0, 1.0, 1);
+    let (mut n, mut factor, mut next) = (0, 1.0 / first as f64, first + 1);
     while n < TERMS {
-        while last < 2 * n as u32 + first {
-            last += 1;
-            factorial *= last as f64;
-        }
-        all[n] = if n % 2 == 0 { 1.0 / factorial } else { -1.0 / factorial };
+        all[n] = factor;
+        factor /= -(next as f64 * (next + 1) as f64);
+        next += 2;
         n += 1;
     }
     all
