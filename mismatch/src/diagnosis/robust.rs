@@ -12,7 +12,6 @@
 //! errors happen to cancel.
 
 use nalgebra::{DMatrix, SymmetricEigen};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
@@ -266,7 +265,75 @@ fn freedom(blocks: &[Block], inverse: &DMatrix<f64>, slot: usize) -> f64 {
     sum * sum / squares
 }
 
+/// The 97.5 % quantile of Student's t, by its expansion about that of the normal (`abramowitz1964`, 26.7.5).
 fn quantile(freedom: f64) -> f64 {
-    let known = StudentsT::new(0.0, 1.0, freedom.max(LEAST_FREEDOM)).ok();
-    known.map_or(Z_95, |student| student.inverse_cdf(0.975))
+    let (z, n) = (Z_95, freedom.max(LEAST_FREEDOM));
+    let q = z * z;
+    let terms = [
+        z * (q + 1.0) / 4.0,
+        z * ((5.0 * q + 16.0) * q + 3.0) / 96.0,
+        z * (((3.0 * q + 19.0) * q + 17.0) * q - 15.0) / 384.0,
+        z * ((((79.0 * q + 776.0) * q + 1482.0) * q - 1920.0) * q - 945.0) / 92160.0,
+    ];
+    terms.iter().rev().fold(0.0, |sum, term| (sum + term) / n) + z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_windows_share_is_freed_and_products_stay() {
+        let links = [1.0, 0.5, 0.0, 1.0];
+        let average = Average::new(-0.4, &links);
+        let (errors, column) = ([0.3, -1.2, 0.8, 2.0, -0.1], [1.0, 0.5, -2.0, 0.25, 3.0]);
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let freed = product(&average.freed(&errors), &average.gathered(&column));
+        assert!((freed - product(&errors, &column)).abs() < 1e-12);
+        // The variance of a product with a column: a' R a with the correlations written out.
+        let squares =
+            |column: &[f64]| average.gathered(column).iter().map(|value| value * value).sum::<f64>();
+        let pairs: f64 = (0..4).map(|row| 2.0 * -0.4 * links[row] * column[row] * column[row + 1]).sum();
+        assert!((squares(&column) - (product(&column, &column) + pairs)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_slow_effect_is_as_sure_as_the_readings_at_both_ends() {
+        // Differences of readings with errors of one: of their mean only the first and the last are left.
+        let mut state = 1_u64;
+        let mut reading = || {
+            (0..12).fold(-6.0, |sum, _| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                sum + (state >> 11) as f64 / (1_u64 << 53) as f64
+            })
+        };
+        let readings: Vec<f64> = (0..401).map(|_| reading()).collect();
+        let scale = 0.5_f64.sqrt();
+        let errors: Vec<f64> = readings.windows(2).map(|pair| scale * (pair[1] - pair[0])).collect();
+        let average = Average::likeliest(&errors, &[1.0; 399]).unwrap();
+        let variance: f64 = average.gathered(&[1.0; 400]).iter().map(|value| value * value).sum();
+        // One of all readings: 2 * scale^2 = 1, instead of 400 of independent errors.
+        assert!((0.5..8.0).contains(&variance), "{variance}");
+        // Readings that are not shared stay independent.
+        let own = Average::likeliest(&readings[..400], &[1.0; 399]).unwrap();
+        let variance: f64 = own.gathered(&[1.0; 400]).iter().map(|value| value * value).sum();
+        assert!((280.0..=400.0 + 1e-9).contains(&variance), "{variance}");
+    }
+
+    #[test]
+    fn few_blocks_are_as_many_as_say_as_much_as_each_other() {
+        let block = |share: f64| Block {
+            score: nalgebra::DVector::zeros(1),
+            variance: DMatrix::from_element(1, 1, share),
+        };
+        let identity = DMatrix::from_element(1, 1, 1.0);
+        let even: Vec<Block> = (0..10).map(|_| block(2.0)).collect();
+        assert!((freedom(&even, &identity, 0) - 10.0).abs() < 1e-12);
+        let two: Vec<Block> = [5.0, 5.0, 0.0, 0.0].map(block).to_vec();
+        assert!((freedom(&two, &identity, 0) - 2.0).abs() < 1e-12);
+        // Quantiles of tables.
+        for (freedom, known) in [(4.0, 2.776_445), (10.0, 2.228_139), (60.0, 2.000_298), (1e9, 1.959_964)] {
+            assert!((quantile(freedom) - known).abs() < 5e-3 / freedom.min(1e3), "{freedom}");
+        }
+    }
 }
