@@ -5,7 +5,7 @@ use std::ops::Range;
 use pleiad_estimation::RobotId;
 use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::predict::{BodyWindow, truth_change};
-use pleiad_physics::{Pose, RobotModel, Scalar, Surroundings};
+use pleiad_physics::{ActiveEffect, Effect, Pose, RobotModel, Scalar, Surroundings};
 
 use crate::channel::Channel;
 use crate::evidence::Evidence;
@@ -16,6 +16,9 @@ use crate::windows::{Window, windows};
 
 /// Length of a window, seconds.
 const WINDOW_S: f64 = 1.0;
+/// A push lasts so long, seconds: of one that a reference pose is taken in the midst of, the window before shows a
+/// part and the window after the rest.
+pub(crate) const PUSH_S: f64 = 0.04;
 
 /// A window of the body.
 pub(crate) struct Motion {
@@ -47,6 +50,30 @@ impl Motion {
         if !self.joined {
             *state = BodyState::default();
         }
+        if let Some((stamp_s, share)) = self.split_push(model) {
+            let [before, after] = [-PUSH_S, PUSH_S].map(|shift_s| moved_push(model, stamp_s + shift_s));
+            let first = self.rolled_out(track, &before, &mut state.clone());
+            let last = self.rolled_out(track, &after, state);
+            let mix = |first: S, last: S| first * share + last * (1.0 - share);
+            let turned = mix(S::zero(), last.yaw_rad - first.yaw_rad);
+            return Pose::new(mix(first.x_m, last.x_m), mix(first.y_m, last.y_m), first.yaw_rad + turned);
+        }
+        self.rolled_out(track, model, state)
+    }
+
+    /// The stamp of the reference pose that a push of a model happens at, and the share of the push before it.
+    fn split_push<S: Scalar>(&self, model: &RobotModel<S>) -> Option<(f64, f64)> {
+        let onset_s = push_s(model)?;
+        let shares = self.stamps_s.map(|stamp_s| (stamp_s, 0.5 + (stamp_s - onset_s) / PUSH_S));
+        shares.into_iter().find(|(_, share)| *share > 0.0 && *share < 1.0)
+    }
+
+    fn rolled_out<S: Scalar>(
+        &self,
+        track: &Track,
+        model: &RobotModel<S>,
+        state: &mut BodyState<S>,
+    ) -> Pose<S> {
         let window = BodyWindow {
             track: &track.encoders[self.reach.clone()],
             ends: [self.window.first, self.window.last].map(|end| end - self.reach.start),
@@ -56,6 +83,25 @@ impl Motion {
         };
         truth_change(model, &window, self.stamps_s, state)
     }
+}
+
+/// When a model is pushed.
+pub(crate) fn push_s<S: Scalar>(model: &RobotModel<S>) -> Option<f64> {
+    let push = model.effects.iter().find(|active| active.effect() == Effect::Push)?;
+    push.values().first().map(|onset_s| onset_s.value())
+}
+
+/// The model, pushed at another instant.
+fn moved_push<S: Scalar>(model: &RobotModel<S>, onset_s: f64) -> RobotModel<S> {
+    let mut moved = model.clone();
+    for active in moved.effects.iter_mut().filter(|active| active.effect() == Effect::Push) {
+        let mut values = active.values().to_vec();
+        values[0] = S::constant(onset_s);
+        if let Ok(next) = ActiveEffect::new(Effect::Push, &values) {
+            *active = next;
+        }
+    }
+    moved
 }
 
 pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Motion> {

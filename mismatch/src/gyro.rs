@@ -7,8 +7,9 @@ use pleiad_estimation::sample::Reading;
 use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::chain::sensors;
 use pleiad_physics::predict::{BodyWindow, EncoderSample, body_motion, mean_gyro};
-use pleiad_physics::{Context, Motion, Pose, RobotModel, Scalar, Surroundings};
+use pleiad_physics::{Context, Effect, Motion, Pose, RobotModel, Scalar, Surroundings};
 
+use crate::body::push_s;
 use crate::channel::Channel;
 use crate::evidence::{Evidence, is_constant};
 use crate::plan::Plan;
@@ -96,9 +97,17 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Stretch> {
 }
 
 /// Mean of the gyro over a window minus what it would read at the yaw rate of the encoders.
+///
+/// A gyro that samples sees a push not at all, once or twice, by where between its readings the push is: it is
+/// compared with what is nearest.
 pub(crate) fn residuals<S: Scalar>(plan: &Plan<Stretch>, model: &RobotModel<S>) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(Channel::Gyro, plan);
     let mut state = BodyState::default();
+    let unpushed = push_s(model).map(|_| {
+        let mut unpushed = model.clone();
+        unpushed.effects.retain(|active| active.effect() != Effect::Push);
+        unpushed
+    });
     for own in &plan.items {
         let window = |samples| BodyWindow::whole(samples, own.start, own.surroundings);
         match &own.before {
@@ -107,9 +116,19 @@ pub(crate) fn residuals<S: Scalar>(plan: &Plan<Stretch>, model: &RobotModel<S>) 
             }
             None => state = BodyState::default(),
         }
-        let predicted = mean_gyro(model, &window(&own.wheels), &mut state);
+        let begun = state;
+        let mut value = -mean_gyro(model, &window(&own.wheels), &mut state) + own.measured;
+        if let Some(unpushed) = &unpushed {
+            let without = -mean_gyro(unpushed, &window(&own.wheels), &mut begun.clone()) + own.measured;
+            let pushed = value - without;
+            for seen in [without, without + pushed * 2.0] {
+                if pushed.value() != 0.0 && seen.value().abs() < value.value().abs() {
+                    value = seen;
+                }
+            }
+        }
         let sigma = sigma(model, own);
-        channel.push(Residual::new(own.middle_s, own.regime, None, &[-predicted + own.measured], &[sigma]));
+        channel.push(Residual::new(own.middle_s, own.regime, None, &[value], &[sigma]));
     }
     channel
 }

@@ -9,7 +9,7 @@ use pleiad_physics::{Pose, Scalar};
 use crate::channel::{Channel, MAX_COMPONENTS};
 use crate::plan::Plan;
 
-/// What the robot was doing, by its encoders, or without them by the velocities it was given.
+/// What the robot was doing, by its encoders, or without them by the reference system.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Regime {
     /// Forward speed, m/s.

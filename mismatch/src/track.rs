@@ -16,6 +16,8 @@ use crate::windows::Window;
 /// Velocity is the motion from this long before an instant to this long after it, seconds: long enough
 /// that a tick of a coarse encoder is small, short against any manoeuvre.
 const VELOCITY_REACH_S: f64 = 0.05;
+/// Velocity from truth is the motion over this, seconds: poses nearer to each other say mostly their noise.
+const VELOCITY_STEP_S: f64 = 2.0 * VELOCITY_REACH_S;
 /// A truth sample is carried no farther than this, seconds.
 const TRUTH_REACH_S: f64 = 0.1;
 /// By a clock's error or a latency a reference pose is carried no farther along the encoders, seconds.
@@ -46,8 +48,9 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    /// Reckons by the encoders with the declared geometry, or without encoders by the velocities: over the
-    /// few milliseconds that truth is carried, their errors do not matter.
+    /// Reckons by the encoders with the declared geometry; without encoders by how the reference system saw the
+    /// robot move, because commands say what it was to do and not what it did; without either by the
+    /// velocities. Over the few milliseconds that truth is carried, their errors do not matter.
     pub(crate) fn new(recording: &RobotRecording, model: &RobotModel<f64>, origin: Timestamp) -> Self {
         let mut encoders: Vec<_> =
             recording.odometry.iter().filter_map(|sample| encoder_sample(sample, origin)).collect();
@@ -64,8 +67,12 @@ impl Track {
         if commands.is_empty() {
             commands.clone_from(&velocities);
         }
+        let truth: Vec<_> = recording.truth.iter().map(|sample| truth_pose(sample, origin)).collect();
+        let seen = seen_steps(&truth);
         let reckoning = if !encoders.is_empty() {
             Reckoning::new(wheel_steps(&encoders, geometry_m), pause_s)
+        } else if let Some(steps) = seen {
+            Reckoning::new(steps.into_iter(), PAUSE_FACTOR * VELOCITY_STEP_S)
         } else if !velocities.is_empty() {
             Reckoning::new(held_steps(&velocities), gap_s(&velocities))
         } else {
@@ -74,7 +81,7 @@ impl Track {
         Self {
             encoders,
             pause_s,
-            truth: recording.truth.iter().map(|sample| truth_pose(sample, origin)).collect(),
+            truth,
             commanded_s: stretches(&commands),
             commands: changes(commands),
             reckoning,
@@ -349,6 +356,28 @@ fn wheel_steps(encoders: &[EncoderSample], [radius_m, axle_m]: [f64; 2]) -> impl
     })
 }
 
+/// How truth moved, by samples [`VELOCITY_STEP_S`] apart: forward in the heading that it has in the middle. `None` if
+/// truth is too rare for velocities.
+fn seen_steps(truth: &[(f64, Pose<f64>)]) -> Option<Vec<Step>> {
+    if median_step(truth.iter().map(|(time_s, _)| *time_s)) > VELOCITY_STEP_S {
+        return None;
+    }
+    // A stamp that is a rounding error early is not early.
+    let least_s = VELOCITY_STEP_S * (1.0 - 1e-6);
+    let mut kept: Vec<(f64, Pose<f64>)> = Vec::new();
+    for &(time_s, pose) in truth {
+        if kept.last().is_none_or(|(last_s, _)| time_s - last_s >= least_s) {
+            kept.push((time_s, pose));
+        }
+    }
+    let step = |(index, (time_s, pose)): (usize, &(f64, Pose<f64>))| {
+        let moved = kept.get(index + 1).map_or_else(Pose::identity, |(_, next)| pose.between(next));
+        let [forward_m, _] = Pose::new(0.0, 0.0, 0.5 * moved.yaw_rad).rotate_back([moved.x_m, moved.y_m]);
+        Step { time_s: *time_s, forward_m, yaw_rad: moved.yaw_rad }
+    };
+    Some(kept.iter().enumerate().map(step).collect())
+}
+
 /// What the body does if each velocity holds to the next.
 fn held_steps(commands: &[Command]) -> impl Iterator<Item = Step> + '_ {
     commands.iter().enumerate().map(|(index, command)| {
@@ -445,6 +474,27 @@ mod tests {
             let x_m = found.map(|[x_m, _]| x_m);
             assert!(x_m.zip(expected).map_or(x_m == expected, |(a, b)| (a - b).abs() < 1e-9), "{x_m:?}");
         }
+    }
+
+    #[test]
+    fn without_encoders_velocities_are_those_of_truth_and_not_of_commands() {
+        let mut recording = RobotRecording::default();
+        for index in 0..200 {
+            let time_s = 0.01 * f64::from(index);
+            let time = Timestamp::from_seconds(time_s);
+            // On a circle of 0.5 m at 0.8 rad/s, to the left.
+            let yaw = 0.8 * time_s;
+            let pose = Pose2::new(0.5 * yaw.sin(), 0.5 * (1.0 - yaw.cos()), yaw);
+            recording.truth.push(TruthSample { time, pose });
+            let reading = Reading::Velocity { forward_m_s: -3.0, yaw_rate_rad_s: 2.0 };
+            recording.push(Sample { time, reading });
+        }
+        let model = RobotModel::nominal(Drive::Differential, Nominal::ideal(0.05, 0.3));
+        let track = Track::new(&recording, &model, Timestamp(0));
+        let regime = track.regime_at(1.0).unwrap();
+        // A chord of 0.08 rad is shorter than its arc by 0.08^2 / 24.
+        assert!((regime.speed_m_s - 0.4).abs() < 0.4 * 3e-4, "{}", regime.speed_m_s);
+        assert!((regime.yaw_rate_rad_s - 0.8).abs() < 1e-9, "{}", regime.yaw_rate_rad_s);
     }
 
     #[test]

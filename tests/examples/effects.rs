@@ -1,5 +1,5 @@
 //! Writes the table of `docs/benchmarks/effects.md`:
-//! `cargo run -p pleiad-tests --example effects -- [--seeds N] [--out PAGE] [--keep FOLDER] [EFFECT...]`.
+//! `cargo run -p pleiad-tests --example effects -- [--first-seed N] [--seeds N] [--out PAGE] [--keep FOLDER] [EFFECT...]`.
 //!
 //! With a folder, every case that is done is kept there, and one that was kept is not run again.
 
@@ -21,17 +21,19 @@ fn main() -> ExitCode {
 }
 
 fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
-    let mut seeds: Vec<u64> = SEEDS.collect();
+    let mut first = *SEEDS.start();
+    let mut count = SEEDS.count() as u64;
     let mut out = None;
     let mut keep = None;
     let mut chosen: Vec<Case> = Vec::new();
     while let Some(argument) = arguments.next() {
         let mut value = |what: &str| arguments.next().ok_or_else(|| format!("{argument} needs {what}"));
         match argument.as_str() {
-            "--seeds" => {
-                let count = value("a number")?;
-                let count: u64 = count.parse().map_err(|_| format!("--seeds {count}: expected a number"))?;
-                seeds = (1..=count).collect();
+            "--first-seed" | "--seeds" => {
+                let given = value("a number")?;
+                let number: u64 =
+                    given.parse().map_err(|_| format!("{argument} {given}: expected a number"))?;
+                *if argument == "--seeds" { &mut count } else { &mut first } = number;
             }
             "--out" => out = Some(value("a page")?),
             "--keep" => keep = Some(PathBuf::from(value("a folder")?)),
@@ -41,6 +43,7 @@ fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
     if chosen.is_empty() {
         chosen = cases();
     }
+    let seeds: Vec<u64> = (first..first + count).collect();
     let begun = std::time::Instant::now();
     let mut progress = std::io::stderr();
     let mut outcomes = Vec::new();
@@ -61,7 +64,9 @@ fn written(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
 fn kept_or_run(case: &Case, seeds: &[u64], folder: Option<&Path>) -> Result<Outcome, String> {
     let Some(folder) = folder else { return Ok(run(case, seeds)) };
     let values: Vec<String> = case.values.iter().map(f64::to_string).collect();
-    let file = folder.join(format!("{}_{}_{}.json", case.effect.name(), values.join("_"), seeds.len()));
+    let first = seeds.first().copied().unwrap_or(0);
+    let name = format!("{}_{}_{first}_{}.json", case.effect.name(), values.join("_"), seeds.len());
+    let file = folder.join(name);
     let place = file.display();
     if file.exists() {
         let text = std::fs::read_to_string(&file).map_err(|error| format!("{place}: {error}"))?;

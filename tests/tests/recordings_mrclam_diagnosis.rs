@@ -104,7 +104,7 @@ fn what_was_fitted_on_one_dataset_predicts_headings_of_the_other_a_tenth_better_
 }
 
 #[test]
-#[ignore = "open: permuted commands show heavy tails where latency and blur were; docs/benchmarks/mrclam-diagnosis.md"]
+#[ignore = "open: permuted commands show heavy tails on robot 4; docs/benchmarks/mrclam-diagnosis.md"]
 fn commands_that_belong_to_another_time_name_nothing_that_the_right_ones_do_not_show() {
     let known = shown(&diagnoses()[0]);
     for (name, control) in CONTROLS {

@@ -16,8 +16,9 @@ use crate::diagnosis::fit::{Effort, Fit, fit};
 use crate::diagnosis::naming::{Estimated, Z_95, groups, total};
 use crate::diagnosis::profile::{Profile, polish};
 use crate::diagnosis::refine::refine;
+use crate::diagnosis::robust::{Robust, robust};
 use crate::diagnosis::run::{Prepared, unit};
-use crate::diagnosis::select::{Scored, covariance, fit_beside, score, whites};
+use crate::diagnosis::select::{Scored, fit_beside, score, whites};
 use crate::diagnosis::spread::{is_of_spread, known, known_swap};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
@@ -123,7 +124,7 @@ pub fn fit_known(
         }
         known(&units, &current, effect, robot)
     });
-    let of_spread = of_spread.map(|estimated| known_fit(&units, &estimated, None));
+    let of_spread = of_spread.map(|estimated| known_fit(&units, &estimated, &|_| Z_95, None));
     Ok(of_mean.into_iter().chain(of_spread).collect())
 }
 
@@ -149,14 +150,19 @@ fn found(units: &[&Unit<'_>], current: &Fit, effect: Effect, whose: Whose) -> Op
 /// Values and intervals of every term of a fit.
 fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
     // Thresholds alone leave nothing that has a derivative.
-    let found = if fit.slots.is_empty() { None } else { covariance(units, fit) };
-    let covariance =
-        found.unwrap_or_else(|| DMatrix::from_element(fit.slots.len(), fit.slots.len(), f64::NAN));
+    let Robust { covariance, quantiles } = robust(units, fit).unwrap_or_else(|| {
+        let size = fit.slots.len();
+        Robust { covariance: DMatrix::from_element(size, size, f64::NAN), quantiles: vec![Z_95; size] }
+    });
     let profile = Profile::new(units, fit);
     let groups = groups(units, &fit.terms);
     let one = |position: usize| {
         let estimated = Estimated::of(fit, &covariance, position);
-        let mut own = known_fit(units, &estimated, Some((&profile, position)));
+        let quantile = |parameter: usize| {
+            let slot = fit.slots.iter().position(|slot| *slot == (position, parameter));
+            slot.map_or(Z_95, |slot| quantiles[slot])
+        };
+        let mut own = known_fit(units, &estimated, &quantile, Some((&profile, position)));
         own.total =
             groups.iter().filter(|group| group.len() > 1 && group.contains(&position)).find_map(|group| {
                 let (label, Estimate { value, ci95, .. }) = total(units, (fit, &covariance, group))?;
@@ -179,6 +185,7 @@ fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
 fn known_fit(
     units: &[&Unit<'_>],
     estimated: &Estimated,
+    quantile: &dyn Fn(usize) -> f64,
     profile: Option<(&Profile<'_, '_>, usize)>,
 ) -> KnownFit {
     let term = &estimated.term;
@@ -209,11 +216,12 @@ fn known_fit(
         }
         parameters.push(own);
     }
-    for (own, variance) in parameters.iter_mut().zip(dragged) {
-        if own.interval == Interval::Sandwich && variance > 0.0 {
-            let error = own.standard_error.map_or(0.0, |error| error.hypot(variance.sqrt()));
+    for (index, (own, variance)) in parameters.iter_mut().zip(dragged).enumerate() {
+        if let (Interval::Sandwich, Some(error)) = (own.interval, own.standard_error) {
+            let error = error.hypot(variance.sqrt());
+            let half = quantile(index) * error;
             own.standard_error = Some(error);
-            own.ci95 = Some([own.value - Z_95 * error, own.value + Z_95 * error]);
+            own.ci95 = Some([own.value - half, own.value + half]);
         }
     }
     KnownFit {

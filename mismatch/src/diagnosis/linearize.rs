@@ -3,7 +3,7 @@
 //! An effect that has directions to start in is off at its start, so that it may stand in the same model as
 //! others that are: their derivatives are those that each would have alone.
 
-use pleiad_physics::Variable;
+use pleiad_physics::{Effect, Variable};
 
 use crate::channel::Channel;
 use crate::diagnosis::fit::{State, residuals};
@@ -79,15 +79,18 @@ fn jobs(units: &[&Unit<'_>], requests: &[Request]) -> Vec<Job> {
             let channels = || group.iter().map(|&which| unit.stretches[which].channel);
             let showing =
                 own().filter(|(_, request)| channels().any(|channel| touches(request.term.effect, channel)));
-            let slots: Vec<(usize, usize)> = showing
-                .flat_map(|(request, own)| (0..own.along.len()).map(move |position| (request, position)))
-                .collect();
-            let chunks = slots.chunks(MOST_AT_ONCE);
-            jobs.extend(chunks.map(|slots| Job::Slopes {
-                unit: index,
-                group: group.clone(),
-                slots: slots.to_vec(),
-            }));
+            let (pushes, rest): (Vec<_>, Vec<_>) =
+                showing.partition(|(_, request)| request.term.effect == Effect::Push);
+            let slots = |requests: &[(usize, &Request)]| -> Vec<(usize, usize)> {
+                let all = requests.iter();
+                all.flat_map(|(request, own)| (0..own.along.len()).map(move |position| (*request, position)))
+                    .collect()
+            };
+            let rest = slots(&rest);
+            // Which window shows a push depends on its instant: no two in one model.
+            let pushes = pushes.iter().map(|push| slots(std::slice::from_ref(push)));
+            let chunks = rest.chunks(MOST_AT_ONCE).map(<[_]>::to_vec).chain(pushes);
+            jobs.extend(chunks.map(|slots| Job::Slopes { unit: index, group: group.clone(), slots }));
         }
         let whole = own().filter(|(_, request)| request.along.is_empty());
         jobs.extend(whole.map(|(request, _)| Job::Whole { unit: index, request }));

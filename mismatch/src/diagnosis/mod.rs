@@ -20,6 +20,7 @@ mod power;
 mod profile;
 mod refine;
 mod related;
+mod robust;
 mod rolled;
 mod run;
 mod select;

@@ -3,8 +3,10 @@
 //! They have no derivative to follow. The likelihood is profiled: at each value the parameters that have one
 //! are fitted again, by one step at the noise of the fit, which is exact where they are amplitudes.
 
-use pleiad_physics::{Fit as How, Parameter};
+use pleiad_physics::{Effect, Fit as How, Parameter};
 
+use crate::body::PUSH_S;
+use crate::channel::Channel;
 use crate::diagnosis::fit::{Effort, Fit, Normal, Slot, State, columns, fit, residuals};
 use crate::diagnosis::naming::Z_95;
 use crate::diagnosis::noise;
@@ -15,10 +17,15 @@ use crate::diagnosis::unit::Unit;
 use crate::diagnosis::white::{White, step};
 use crate::track::median_step;
 
-/// The 95 % quantile of chi-square with one degree of freedom: what twice the log-likelihood may lose.
-const CHI_SQUARE_95: f64 = 3.841_458_820_694_124;
+/// What twice the log-likelihood may lose at a value where predictions jump, in 95 % of all cases: the quantile of
+/// `(1 - exp(-x/2))^2` (`hansen2000`). It is not that of chi-square: readings change sides one by one, and the best
+/// value is the greatest of a random walk.
+const JUMP_95: f64 = 7.352_276_694_155_739;
 /// Onsets are searched from this to this, seconds.
 const ONSET_STEPS_S: (f64, f64) = (0.05, 0.005);
+/// A push is searched to so short steps, seconds: how a push is split between the windows before and after a
+/// reference pose hangs on where in its short duration the pose is.
+const LAST_PUSH_STEP_S: f64 = 0.0005;
 /// Borders are searched from this to this, metres.
 const BORDER_STEPS_M: (f64, f64) = (0.1, 0.005);
 /// Thresholds are searched from this to this share of themselves.
@@ -41,7 +48,9 @@ const DOUBLINGS: usize = 12;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounded {
     pub(crate) ci95: [f64; 2],
+    /// The last values tried that are within, and the first that are not.
     within: [f64; 2],
+    beyond: [f64; 2],
 }
 
 /// The profile about a fit.
@@ -146,10 +155,18 @@ impl<'u, 'a> Profile<'u, 'a> {
         }
         let (_, least) = steps(term, slot.1);
         let most = self.at(slot, value)?;
-        let low = self.end(slot, value, -least, most, CHI_SQUARE_95)?;
-        let high = self.end(slot, value, least, most, CHI_SQUARE_95)?;
-        let reach = if Placing::of(term.effect.info()).onset == Some(slot.1) { self.step_s() } else { 0.0 };
-        Some(Bounded { ci95: [low[1] - reach, high[1] + reach], within: [low[0], high[0]] })
+        let low = self.end(slot, value, -least, most, JUMP_95)?;
+        let high = self.end(slot, value, least, most, JUMP_95)?;
+        let mut reach =
+            if Placing::of(term.effect.info()).onset == Some(slot.1) { self.step_s() } else { 0.0 };
+        if term.effect == Effect::Push {
+            reach += 0.5 * PUSH_S;
+        }
+        Some(Bounded {
+            ci95: [low[1] - reach, high[1] + reach],
+            within: [low[0], high[0]],
+            beyond: [low[1], high[1]],
+        })
     }
 
     /// The longest usual step of the encoders, seconds: predictions act in such steps and have no onset within
@@ -160,11 +177,30 @@ impl<'u, 'a> Profile<'u, 'a> {
         steps.filter(|step_s| step_s.is_finite()).fold(0.0, f64::max)
     }
 
+    /// The stamps of the reference poses at which windows of the body meet, as near as this to an instant, seconds.
+    fn reference_near(&self, time_s: f64, reach_s: f64) -> Vec<f64> {
+        let mut found = Vec::new();
+        for unit in self.units {
+            let (Some(stretch), Some(track)) =
+                (unit.stretch(Channel::Body), unit.evidence.tracks.get(&unit.robot))
+            else {
+                continue;
+            };
+            let middles = unit.rows[stretch.range()].iter().step_by(stretch.components).map(|row| row.time_s);
+            let middles: Vec<f64> = middles.collect();
+            let meet = middles.windows(2).map(|pair| f64::midpoint(pair[0], pair[1]));
+            let near = meet.filter(|meet_s| (meet_s - time_s).abs() < reach_s);
+            found.extend(near.filter_map(|meet_s| track.truth_near(meet_s)).map(|(stamp_s, _)| stamp_s));
+        }
+        found
+    }
+
     /// How unsure the other parameters of a term are because one without derivative is: half of what they move
-    /// over its interval, over 1.96. Beyond its ends they may be anything.
+    /// where the likelihood leaves it, over 1.96. Beyond its ends they may be anything; within the steps that an
+    /// interval is wider by, predictions do not change.
     pub(crate) fn dragged(&self, slot: Slot, bounded: &Bounded) -> Option<Vec<f64>> {
         let [from, to] = bounded.within;
-        let share = (bounded.ci95[1] - bounded.ci95[0]) / (to - from);
+        let share = (bounded.beyond[1] - bounded.beyond[0]) / (to - from);
         if !share.is_finite() {
             return None;
         }
@@ -210,7 +246,8 @@ fn cost(state: &State) -> f64 {
 fn steps(term: &Term, parameter: usize) -> (f64, f64) {
     let placing = Placing::of(term.effect.info());
     if placing.onset == Some(parameter) {
-        return ONSET_STEPS_S;
+        let last_s = if term.effect == Effect::Push { LAST_PUSH_STEP_S } else { ONSET_STEPS_S.1 };
+        return (ONSET_STEPS_S.0, last_s);
     }
     if placing.region.is_some_and(|first| (first..first + 4).contains(&parameter)) {
         return BORDER_STEPS_M;
@@ -265,9 +302,16 @@ pub(crate) fn polish_some(
             terms[slot.0].values[slot.1] = value;
             current.terms[slot.0].values[slot.1] = value;
         }
+        // A push that was taken for half of one, because two windows show half each, is the whole.
+        let doubled = doubled(&terms, &loose).and_then(|terms| fit(units, terms, movable, effort));
         match fit(units, terms, movable, effort) {
             Some(next) => current = next,
             None => return current,
+        }
+        if let Some(doubled) = doubled
+            && doubled.log_likelihood > current.log_likelihood
+        {
+            current = doubled;
         }
         // Another round is for parameters that follow each other.
         if !moved || loose.len() == 1 {
@@ -275,6 +319,19 @@ pub(crate) fn polish_some(
         }
     }
     current
+}
+
+/// Terms in which the pushes that are searched jump twice as far; `None` if there are none.
+fn doubled(terms: &[Term], searched: &[Slot]) -> Option<Vec<Term>> {
+    let mut doubled = terms.to_vec();
+    let mut any = false;
+    for &(term, onset) in searched.iter().filter(|(term, _)| terms[*term].effect == Effect::Push) {
+        let jumps = doubled[term].values.iter_mut().enumerate().filter(|(index, _)| *index != onset);
+        jumps.for_each(|(_, jump)| *jump *= 2.0);
+        doubled[term].clamp();
+        any = true;
+    }
+    any.then_some(doubled)
 }
 
 /// Whether a parameter was moved away from "off".
@@ -292,7 +349,12 @@ fn best(profile: &Profile<'_, '_>, slot: Slot, far: bool) -> f64 {
     let mut most = at(value);
     if far && Placing::of(term.effect.info()).onset == Some(slot.1) {
         let (step_s, steps) = ONSET_GRID;
-        for other in (-steps..=steps).map(|step| term.values[slot.1] + step_s * f64::from(step)) {
+        let begun_s = term.values[slot.1];
+        let mut others: Vec<f64> = (-steps..=steps).map(|step| begun_s + step_s * f64::from(step)).collect();
+        if term.effect == Effect::Push {
+            others.extend(profile.reference_near(begun_s, step_s * f64::from(steps)));
+        }
+        for other in others {
             let there = at(other);
             if there > most {
                 (value, most) = (other, there);

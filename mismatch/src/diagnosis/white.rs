@@ -36,6 +36,14 @@ impl<'u, 'a> White<'u, 'a> {
         white
     }
 
+    /// The model's parameters that show in a stretch, with what they predict there.
+    pub(crate) fn columns(&self, which: usize) -> impl Iterator<Item = (usize, &[f64])> {
+        self.active
+            .iter()
+            .enumerate()
+            .filter_map(move |(slot, column)| Some((slot, column[which].as_deref()?)))
+    }
+
     /// A column in sigmas, per stretch.
     fn of(&self, column: &Column) -> Vec<Option<Vec<f64>>> {
         let part = |(part, stretch): (&Option<Vec<f64>>, &Stretch)| {
@@ -188,12 +196,17 @@ pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<S
 
 /// The meat of a sandwich, at least [`LEAST_SHARE`] of `bread` in every direction, and their mean ratio.
 pub(crate) fn floored(meat: &DMatrix<f64>, bread: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
+    raised(meat, bread, LEAST_SHARE)
+}
+
+/// The meat of a sandwich, at least a share of `bread` in every direction, and their mean ratio.
+pub(crate) fn raised(meat: &DMatrix<f64>, bread: &DMatrix<f64>, least: f64) -> Option<(DMatrix<f64>, f64)> {
     let size = bread.nrows();
     let factor = bread.clone().cholesky()?.l();
     let inverse = factor.solve_lower_triangular(&DMatrix::identity(size, size))?;
     let whitened = &inverse * meat * inverse.transpose();
     let eigen = SymmetricEigen::new(0.5 * (&whitened + whitened.transpose()));
-    let raised = eigen.eigenvalues.map(|value| value.max(LEAST_SHARE));
+    let raised = eigen.eigenvalues.map(|value| value.max(least));
     let inflation = raised.sum() / size as f64;
     let vectors = &factor * &eigen.eigenvectors;
     Some((&vectors * DMatrix::from_diagonal(&raised) * vectors.transpose(), inflation))

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::diagnosis::white::floored;
+use crate::diagnosis::white::raised;
 
 /// Largest number of steps.
 const STEPS: usize = 60;
@@ -216,7 +216,7 @@ pub(super) fn uncertainty(
             sums[(position, block)] += scores[position][row];
         }
     }
-    let (meat, _) = floored(&(&sums * sums.transpose()), &curvature)?;
+    let (meat, _) = raised(&(&sums * sums.transpose()), &curvature, 1.0)?;
     let naive = curvature.cholesky()?.inverse();
     let covariance = &naive * meat * &naive;
     covariance.iter().all(|value| value.is_finite()).then_some(Uncertainty { free, covariance, naive })
