@@ -3,7 +3,6 @@
 
 #![cfg(feature = "slow")]
 
-use pleiad_physics::Effect;
 use pleiad_tests::known_effects::{COVERED, EXCEPTIONS, Outcome, SEEDS, cases, covered, run, shortfalls};
 
 /// The wishes hold but for the exceptions listed with their causes, and those are exceptions still: one that no
@@ -17,9 +16,6 @@ fn standard_errors_are_small_and_right_but_where_it_is_said() {
     assert!(new.is_empty(), "not listed: {new:#?}");
     let gone: Vec<_> = EXCEPTIONS.iter().filter(|own| !short.iter().any(|short| own.is(short))).collect();
     assert!(gone.is_empty(), "listed, and better than that: {gone:#?}");
-    // Of all intervals too few hold the truth, because of `push`: once that is better, this has to go.
-    let wanted = COVERED[0]..=COVERED[1];
-    let [all, others] = [None, Some(Effect::Push)].map(|without| covered(&outcomes, without));
-    assert!(wanted.contains(&others), "{others} of the intervals hold the truth, without push");
-    assert!(!wanted.contains(&all), "{all} of all intervals hold the truth: say so in the page");
+    let found = covered(&outcomes);
+    assert!((COVERED[0]..=COVERED[1]).contains(&found), "{found} of the intervals hold the truth");
 }

@@ -27,22 +27,15 @@ impl Exception {
 /// Where no cause was found: of twenty seeds, one row in 17 is outside by chance alone.
 pub const UNKNOWN: &str = "no cause was found; by chance one row in 17 is outside";
 
-const TICKS: &str = "presumed, not measured: errors of a wheel reading, or of a reference pose, that two windows share \
-    cancel in what is slow, and the variance of scores is held at half of that of independent errors at \
-    least: these intervals are too wide";
-const ONSET: &str = "presumed, not measured: one step of the encoders is added to the interval of an onset, which is \
-    wider than what the data leave open";
 const GRID: &str = "the commands have no values between, so that the likelihood is flat there: the interval is that \
     step, the same in every seed, and the truth where it happens to be";
 const COUNT: &str = "ticks are counted, without an error";
-const BORDER: &str = "presumed, not measured: the likelihood of an onset or a border has several peaks, one for each \
-    reading that changes sides; an interval ends at the first valley that is deep enough, with the other \
-    borders held";
-const PUSH: &str = "the push is at a whole second, where windows meet and the simulated reference system takes a pose; \
-    the simulator spreads a push over 5 ms, so that this pose is in its midst and either window shows \
-    half of it (seen in the residuals of seed 1; in six seeds, this one among them, jump.x is fitted at \
-    about half). Presumed besides: its gyro reads 10 ms of every 20 and misses every second push, where \
-    the prediction takes means. In two of 20 seeds another instant fits better";
+const BORDER: &str = "presumed, not measured: the likelihood of a border has several peaks, one for each reading that \
+    changes sides; in two seeds of twenty another peak is the highest, and an interval ends at the first valley \
+    that is deep enough, with the other borders held";
+const PUSH: &str = "presumed, not measured: the push is at a whole second, where windows meet and the simulated \
+    reference system takes a pose in its midst; it is taken to be even over 0.04 s, where the simulator spreads it \
+    over 5 ms. All 80 intervals of a push hold the truth";
 const BACK: &str = "the ticks of the encoders, a tenth of the play: about 1.4 % of the size too little. With exact \
     encoders mean z^2 is 1.09 without bias; without jitter of commands it stays at 2.08";
 const STEER: &str = "0.3 % of the size too little, in three seeds without noise of the reference too. Presumed, not \
@@ -65,49 +58,26 @@ const fn known(effect: Effect, label: &'static str, wish: Wish, why: &'static st
 
 /// Every shortfall.
 pub const EXCEPTIONS: &[Exception] = &[
-    known(Effect::ActuatorGain, "v_relative", Wish::NotTooUnsure, TICKS),
-    known(Effect::CommandDelay, "delay_s", Wish::NotTooUnsure, TICKS),
-    known(Effect::FloorTilt, "slope_rad", Wish::NotTooUnsure, TICKS),
-    known(Effect::FloorTilt, "downhill_azimuth_rad", Wish::NotTooUnsure, TICKS),
-    known(Effect::PayloadAdded, "lag_change_s", Wish::NotTooUnsure, TICKS),
-    known(Effect::QuadraticDrag, "s_per_m", Wish::NotTooUnsure, TICKS),
-    known(Effect::SpeedDependentScale, "s_per_m", Wish::NotTooUnsure, TICKS),
-    known(Effect::SpeedSaturation, "wheel_speed_max_rad_s", Wish::NotTooUnsure, TICKS),
-    known(Effect::StickyWheel, "droop", Wish::NotTooUnsure, TICKS),
-    known(Effect::TurnLoss, "coefficient_s", Wish::NotTooUnsure, TICKS),
-    known(Effect::WorldDrift, "velocity_m_s.x", Wish::NotTooUnsure, TICKS),
-    known(Effect::WorldDrift, "velocity_m_s.y", Wish::NotTooUnsure, TICKS),
-    known(Effect::WorldForce, "droop_m_s", Wish::NotTooUnsure, TICKS),
-    known(Effect::WorldForce, "azimuth_rad", Wish::NotTooUnsure, TICKS),
-    known(Effect::StickyWheel, "t_on_s", Wish::NotTooUnsure, ONSET),
     known(Effect::MotorDeadband, "speed_m_s", Wish::NotTooUnsure, GRID),
     known(Effect::MotorDeadband, "wheel_rad_s", Wish::NotTooSure, GRID),
     known(Effect::EncoderCoarse, "actual_ticks_per_rev", Wish::NotTooUnsure, COUNT),
-    known(Effect::GpsMultipathPatch, "region_m.x_min", Wish::NotTooSure, BORDER),
-    known(Effect::GpsMultipathPatch, "region_m.y_min", Wish::NotTooSure, BORDER),
-    known(Effect::GpsMultipathPatch, "region_m.y_max", Wish::NotTooSure, BORDER),
-    known(Effect::LocalMagneticField, "region_m.x_min", Wish::NotTooSure, BORDER),
-    known(Effect::LocalMagneticField, "region_m.y_max", Wish::NotTooSure, BORDER),
     known(Effect::LowFrictionPatch, "region_m.x_max", Wish::NotTooSure, BORDER),
-    known(Effect::LowFrictionPatch, "region_m.y_max", Wish::NotTooSure, BORDER),
-    known(Effect::PayloadAdded, "t_on_s", Wish::NotTooSure, BORDER),
+    known(Effect::LocalMagneticField, "region_m.y_min", Wish::NotTooSure, BORDER),
     known(Effect::Push, "t_on_s", Wish::NotTooSure, PUSH),
     known(Effect::Push, "jump.x", Wish::NotTooSure, PUSH),
-    known(Effect::Push, "jump.y", Wish::NotTooSure, PUSH),
-    known(Effect::Push, "jump.yaw", Wish::NotTooSure, PUSH),
     known(Effect::Backlash, "rad", Wish::NotTooSure, BACK),
     known(Effect::Understeer, "s2_per_m2", Wish::NotTooSure, STEER),
     known(Effect::AccelerationLimit, "m_s2", Wish::NotTooSure, ACC),
     known(Effect::CommandJitter, "delay_s", Wish::NotTooSure, JITTER),
+    known(Effect::RangeDependentNoise, "s0_m", Wish::Small, RANGE),
     known(Effect::RangeDependentNoise, "s1", Wish::Small, RANGE),
     known(Effect::MissedDetections, "logit.constant", Wish::Small, MISS),
     known(Effect::PayloadAdded, "t_on_s", Wish::Small, LOADON),
-    known(Effect::CompassSoftIron, "amplitude_rad", Wish::NotTooSure, UNKNOWN),
-    known(Effect::LowFrictionPatch, "slip_s", Wish::NotTooSure, UNKNOWN),
-    known(Effect::MissedDetections, "logit.range", Wish::NotTooSure, UNKNOWN),
-    known(Effect::PartnerInfluence, "range_m", Wish::NotTooUnsure, UNKNOWN),
-    known(Effect::RangeDependentNoise, "s1", Wish::NotTooSure, UNKNOWN),
-    known(Effect::RangeDependentNoise, "s2_per_m", Wish::NotTooSure, UNKNOWN),
-    known(Effect::TruthMarkerOffset, "offset_body_m.forward", Wish::NotTooUnsure, UNKNOWN),
-    known(Effect::TruthMarkerOffset, "offset_body_m.left", Wish::NotTooSure, UNKNOWN),
+    known(Effect::SpeedDependentScale, "s_per_m", Wish::NotTooUnsure, UNKNOWN),
+    known(Effect::LowFrictionOverall, "skid_s", Wish::NotTooUnsure, UNKNOWN),
+    known(Effect::SensorLeverArm, "offset_body_m.forward", Wish::NotTooUnsure, UNKNOWN),
+    known(Effect::RangeBias, "bias_m", Wish::NotTooUnsure, UNKNOWN),
+    known(Effect::TruthMarkerOffset, "offset_body_m.left", Wish::NotTooUnsure, UNKNOWN),
+    known(Effect::HeavyTails, "degrees_of_freedom", Wish::NotTooSure, UNKNOWN),
+    known(Effect::CommandLoss, "probability", Wish::NotTooSure, UNKNOWN),
 ];

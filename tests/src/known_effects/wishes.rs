@@ -1,7 +1,5 @@
 //! What is wanted of the table, and which rows fall short for a cause that is known.
 
-use pleiad_physics::Effect;
-
 use super::outcome::{Outcome, Row, mean};
 
 /// The most that a standard error may be, as a share of the size.
@@ -77,8 +75,8 @@ pub fn shortfalls(outcomes: &[Outcome]) -> Vec<Shortfall> {
 }
 
 /// The share of all intervals that hold the truth; without those of one effect, if one is given.
-pub fn covered(outcomes: &[Outcome], without: Option<Effect>) -> f64 {
-    let rows = || outcomes.iter().filter(|own| Some(own.effect) != without).flat_map(|outcome| &outcome.rows);
+pub fn covered(outcomes: &[Outcome]) -> f64 {
+    let rows = || outcomes.iter().flat_map(|outcome| &outcome.rows);
     let covered: usize = rows().map(|row| row.covered).sum();
     let all: usize = rows().map(|row| row.errors.len()).sum();
     covered as f64 / all as f64
