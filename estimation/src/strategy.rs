@@ -33,7 +33,7 @@ use std::str::FromStr;
 
 pub use message::{Answer, Gain, MeetingId, Message, Question, RowAnswer, Sighting, TeamUpdate, Verdict};
 pub use peer::{Noises, Peer, Setup};
-pub use view::{Factor, JointView, View, joint_view};
+pub use view::{Deviation, Factor, JointView, View, error, joint_of_replica, joint_view};
 
 use crate::RobotId;
 use crate::sample::Sample;
