@@ -150,6 +150,13 @@ pub struct Counts {
     pub absolute: u64,
     /// Relative observations that changed this robot's estimate, its own and others'.
     pub used: u64,
+    /// Relative observations that took effect wherever they should, as counted by the robot that was the last
+    /// to know.
+    pub completed: u64,
+    /// Updates of the whole team that this robot broadcast (`factored`).
+    pub broadcast: u64,
+    /// Such updates of others that it applied.
+    pub applied: u64,
     /// Measurements that the gate refused.
     pub rejected: u64,
     /// Observations and messages that wait for an answer or for odometry.

@@ -177,6 +177,7 @@ impl Factored {
         match (update, &mut self.member) {
             (Some(Ok(update)), Some(member)) => {
                 member.apply(self.robot, &update);
+                self.counts.broadcast += 1;
                 out.push(Command::Broadcast(Message::TeamUpdate(update)));
                 return true;
             }
@@ -238,6 +239,7 @@ impl Factored {
         let update = team_update(answer.id, &at, &noise, &participants, &self.gate);
         if self.conclude(update, out) {
             self.counts.used += 1;
+            self.counts.completed += 1;
         }
     }
 }
@@ -303,7 +305,7 @@ impl Core for Factored {
                 self.counts.counted_twice += u64::from(self.seen.repeated(update.id));
                 if let Some(member) = &mut self.member {
                     member.apply(self.robot, &update);
-                    self.counts.used += 1;
+                    self.counts.applied += 1;
                 }
             }
             Message::Sighting(_) | Message::Answer(_) | Message::Verdict(_) => self.counts.refused += 1,

@@ -160,6 +160,7 @@ impl Core for OneWay {
         let Some(fused) = self.fused(&prior, &measured) else {
             // Nothing new in it.
             self.counts.used += 1;
+            self.counts.completed += 1;
             return;
         };
         if fused.nis > self.gate[measured.dimension - 1] {
@@ -167,6 +168,7 @@ impl Core for OneWay {
         } else if let Some(block) = &mut self.block {
             block.take(&fused);
             self.counts.used += 1;
+            self.counts.completed += 1;
         }
     }
 

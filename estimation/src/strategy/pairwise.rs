@@ -254,8 +254,9 @@ impl Pairwise {
         }
         let factor = Factor { version: Some(verdict.id), matrix: Matrix3::identity() };
         let covariance = verdict.covariance.to_matrix();
-        if self.take(&promise.block, verdict.correction, covariance, (from, factor)).is_none() {
-            self.counts.refused += 1;
+        match self.take(&promise.block, verdict.correction, covariance, (from, factor)) {
+            Some(()) => self.counts.completed += 1,
+            None => self.counts.refused += 1,
         }
     }
 }
