@@ -4,7 +4,7 @@ use pleiad_estimation::fact::Noise;
 use pleiad_estimation::geometry::{Matrix3, Vector3};
 use pleiad_estimation::sample::Relative;
 use pleiad_estimation::strategy::{
-    Answer, Gain, MeetingId, Message as Said, Question, RowAnswer, Sighting, TeamUpdate, Verdict,
+    Answer, Change, Gain, MeetingId, Message as Said, Question, RowAnswer, Sighting, TeamUpdate, Verdict,
 };
 use pleiad_estimation::{RobotId, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -48,8 +48,7 @@ enum WireSaid {
     },
     Verdict {
         id: WireMeeting,
-        correction: [f64; 3],
-        covariance: WireSymmetric,
+        change: Option<([f64; 3], WireSymmetric)>,
     },
     RowAnswer {
         id: WireMeeting,
@@ -158,8 +157,7 @@ pub fn put(bytes: &mut Vec<u8>, said: &Said) {
         },
         Said::Verdict(verdict) => WireSaid::Verdict {
             id: verdict.id.into(),
-            correction: verdict.correction.into(),
-            covariance: verdict.covariance.0,
+            change: verdict.change.map(|change| (change.correction.into(), change.covariance.0)),
         },
         Said::RowAnswer(answer) => {
             items.extend(answer.row.iter().map(|(robot, base)| item(*robot, base)));
@@ -213,10 +211,15 @@ pub fn take(reader: &mut Reader<'_>) -> Result<Said, ProtocolError> {
                 None => None,
             },
         }),
-        WireSaid::Verdict { id, correction, covariance } => Said::Verdict(Verdict {
+        WireSaid::Verdict { id, change } => Said::Verdict(Verdict {
             id: id.into(),
-            correction: vector("correction", correction)?,
-            covariance: check::covariance("covariance", covariance)?,
+            change: match change {
+                Some((correction, covariance)) => Some(Change {
+                    correction: vector("correction", correction)?,
+                    covariance: check::covariance("covariance", covariance)?,
+                }),
+                None => None,
+            },
         }),
         WireSaid::RowAnswer { id, pose, covariance, motion } => Said::RowAnswer(RowAnswer {
             id: id.into(),

@@ -260,8 +260,10 @@ pub fn strategy(rng: &mut impl Rng) -> said::Message {
         }),
         3 => said::Message::Verdict(said::Verdict {
             id: meeting(rng),
-            correction: Vector3::new(number(rng), number(rng), number(rng)),
-            covariance: covariance(rng),
+            change: maybe(rng, |rng| said::Change {
+                correction: Vector3::new(number(rng), number(rng), number(rng)),
+                covariance: covariance(rng),
+            }),
         }),
         4 => said::Message::RowAnswer(said::RowAnswer {
             id: meeting(rng),

@@ -1,7 +1,7 @@
 //! Teams of any strategy in one process, under virtual time, over a network with faults that carries the
 //! same bytes as the real one. What they believed at given times is kept, to be judged by others.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use pleiad_agent::{NodeConfig, Participant};
 use pleiad_bus::faults::{InvalidFaults, Traffic};
@@ -85,6 +85,8 @@ struct Run {
     origin: Timestamp,
     /// When each robot's odometry was last read, by a clock without fault.
     read: BTreeMap<RobotId, Timestamp>,
+    /// Observations of `factored` that wait for everyone's odometry, in the order of time.
+    held: VecDeque<(Timestamp, RobotId, Sample)>,
     messages: u64,
     bytes: u64,
     refused_messages: u64,
@@ -120,6 +122,7 @@ pub fn run(
         plan: options.plan.clone(),
         origin,
         read: BTreeMap::new(),
+        held: VecDeque::new(),
         messages: 0,
         bytes: 0,
         refused_messages: 0,
@@ -142,6 +145,7 @@ pub fn run(
         run.sample(time, robot, samples[&robot][index]);
         end = time;
     }
+    run.exchange(end, None);
     let agreed = run.settle(end, options.period_s, options.settling_rounds);
     let last = run.look(end);
     Ok(StrategyOutcome {
@@ -167,7 +171,31 @@ impl Run {
         // The world goes by the right time; the robot stamps by its own.
         let ahead_s = self.plan.clock_error_s(robot, time.seconds_since(self.origin));
         sample.time = sample.time.plus_seconds(ahead_s);
-        self.act(robot, time, Event::Sample(sample));
+        if self.kind != StrategyKind::Factored {
+            self.act(robot, time, Event::Sample(sample));
+        } else if self.read.get(&robot) == Some(&time) || matches!(sample.reading, Reading::Gyro { .. }) {
+            self.act(robot, time, Event::Sample(sample));
+            let reached = self.participants.keys().map(|robot| self.read.get(robot).copied());
+            if let Some(reached) = reached.min().flatten() {
+                self.exchange(time, Some(reached));
+            }
+        } else {
+            self.held.push_back((time, robot, sample));
+        }
+    }
+
+    /// The published form assumes that exchanges follow one another in one order. So an observation waits
+    /// until everyone's odometry has reached it, and on a link without delay its exchange is then over before
+    /// the next one begins.
+    fn exchange(&mut self, now: Timestamp, reached: Option<Timestamp>) {
+        while let Some((time, robot, sample)) = self.held.front().copied() {
+            if reached.is_some_and(|reached| time > reached) {
+                return;
+            }
+            self.held.pop_front();
+            self.act(robot, now, Event::Sample(sample));
+            self.deliver(now);
+        }
     }
 
     fn act(&mut self, robot: RobotId, now: Timestamp, event: Event<Message>) {

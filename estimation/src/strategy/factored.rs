@@ -2,9 +2,9 @@
 //! distributed by factors. Every robot keeps its block and its own row; at a meeting the observer computes
 //! the gain of every robot from the two rows and broadcasts them, and everyone applies what it hears.
 //!
-//! It is the centralized filter as long as every broadcast reaches everyone once and in one order. A lost,
-//! repeated or overtaken broadcast leaves rows that belong to different histories; nothing notices, and
-//! nothing repairs it.
+//! It is the centralized filter as long as every broadcast reaches everyone once and in one order, and no
+//! two exchanges overlap; that order is the transport's to give. A lost, repeated or overtaken broadcast
+//! leaves rows that belong to different histories; nothing notices, and nothing repairs it.
 
 use std::collections::BTreeMap;
 

@@ -81,6 +81,13 @@ pub struct Answer {
 pub struct Verdict {
     /// Which observation.
     pub id: MeetingId,
+    /// What changes; `None` if the observation was not used.
+    pub change: Option<Change>,
+}
+
+/// What a verdict changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Change {
     /// Correction of the estimate that was answered, invariant error.
     pub correction: Vector3,
     /// Covariance after it.

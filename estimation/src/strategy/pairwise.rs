@@ -9,15 +9,20 @@
 //! cross-covariance then counts as unknown, `diag(P_a/w, P_b/(1-w))` bounds the pair for every `w`, and an
 //! update from there leaves both with a cross term they agree on again, unless it would leave them worse
 //! off than before.
+//!
+//! Meetings that overlap would refuse one another's verdicts, so that robots take turns: one question of its
+//! own at a time, and between an answer and its verdict nothing else, for at most [`PATIENCE_S`]. Meetings
+//! are ordered by time, observer and number; a robot with an open question answers only earlier meetings, so
+//! that whoever waits waits for an earlier meeting, and no ring of waiting can close.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use nalgebra::{SMatrix, SVector};
 
 use super::block::{Block, Instant, apply};
-use super::fusion::{least, symmetric};
+use super::fusion::least;
 use super::peer::{Core, Out, too_late};
-use super::{Answer, Command, Counts, Factor, MeetingId, Message, Question, Verdict, View};
+use super::{Answer, Change, Command, Counts, Factor, MeetingId, Message, Question, Verdict, View};
 use crate::fact::{Noise, Quantity};
 use crate::geometry::{Matrix3, Vector3};
 use crate::measurement::{self, Linearization};
@@ -28,8 +33,11 @@ use crate::{Pose2, RobotId, Timestamp};
 
 type Matrix6 = SMatrix<f64, 6, 6>;
 
-/// Questions and answers that may be open at once; older ones are given up.
+/// Own observations and others' questions that may wait for their turn, and answers that a verdict may still
+/// come for; older ones are given up.
 const MOST_OPEN: usize = 64;
+/// How long an answer or a verdict is waited for, s of odometry.
+const PATIENCE_S: f64 = 0.3;
 
 #[derive(Debug)]
 pub(super) struct Pairwise {
@@ -41,19 +49,41 @@ pub(super) struct Pairwise {
     /// `s_ij` of every robot met.
     row: BTreeMap<RobotId, Factor>,
     number: u64,
-    /// Own observations that wait for an answer.
-    open: BTreeMap<u64, Open>,
+    /// The last odometry.
+    now: Timestamp,
+    /// Own observations that wait for their turn.
+    own: VecDeque<Open>,
+    /// The one that waits for an answer, and since when.
+    open: Option<(Open, Timestamp)>,
+    /// Its answer, while a verdict is waited for.
+    answered: Option<Answer>,
+    /// Questions that wait for their turn.
+    questions: BTreeMap<Turn, RobotId>,
+    /// The meeting whose verdict is waited for, and since when.
+    holding: Option<(MeetingId, Timestamp)>,
+    /// Measurements against the map that wait for it too.
+    absolute: VecDeque<(Instant, Quantity, Noise)>,
     /// What was answered, until the verdict.
     promised: BTreeMap<MeetingId, Promise>,
     counts: Counts,
 }
 
+/// The order of meetings.
+type Turn = (Timestamp, MeetingId);
+
 #[derive(Clone, Copy, Debug)]
 struct Open {
+    id: MeetingId,
     time: Timestamp,
     other: RobotId,
     relative: Relative,
     noise: Noise,
+}
+
+impl Open {
+    fn turn(&self) -> Turn {
+        (self.time, self.id)
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -132,7 +162,13 @@ impl Pairwise {
             revision: 0,
             row: BTreeMap::new(),
             number: 0,
-            open: BTreeMap::new(),
+            now: Timestamp::MIN,
+            own: VecDeque::new(),
+            open: None,
+            answered: None,
+            questions: BTreeMap::new(),
+            holding: None,
+            absolute: VecDeque::new(),
             promised: BTreeMap::new(),
             counts: Counts::default(),
         }
@@ -163,15 +199,54 @@ impl Pairwise {
         Some(())
     }
 
-    fn answer(&mut self, from: RobotId, question: Question, trajectory: &NominalTrajectory, out: &mut Out) {
+    /// Goes on with what is next in turn, as far as nothing has to be waited for.
+    fn advance(&mut self, trajectory: &NominalTrajectory, out: &mut Out) {
+        let patient = |since: Timestamp, now: Timestamp| now.seconds_since(since) <= PATIENCE_S;
+        loop {
+            if self.holding.is_some_and(|(_, since)| patient(since, self.now)) {
+                return;
+            }
+            self.holding = None;
+            while let Some((at, quantity, noise)) = self.absolute.pop_front() {
+                self.update_absolute(&at, &quantity, &noise);
+            }
+            if let Some(answer) = self.answered.take() {
+                self.decide(&answer, trajectory, out);
+                continue;
+            }
+            if self.open.is_some_and(|(_, since)| !patient(since, self.now)) {
+                self.open = None;
+                self.counts.refused += 1;
+            }
+            let own = self.open.map(|(open, _)| open).or(self.own.front().copied());
+            let question = self.questions.first_key_value().map(|(turn, from)| (*turn, *from));
+            match (question, own) {
+                (Some((turn, from)), own) if own.is_none_or(|own| turn < own.turn()) => {
+                    self.questions.remove(&turn);
+                    self.answer(from, turn, trajectory, out);
+                }
+                (_, Some(own)) if self.open.is_none() => {
+                    self.own.pop_front();
+                    self.open = Some((own, self.now));
+                    let question = Message::Question(Question { id: own.id, time: own.time });
+                    out.push(Command::Send { to: own.other, message: question });
+                }
+                _ => return,
+            }
+        }
+    }
+
+    fn answer(&mut self, from: RobotId, (time, id): Turn, trajectory: &NominalTrajectory, out: &mut Out) {
+        let question = Question { id, time };
         let (Some(block), Ok(state)) = (&self.block, trajectory.at(question.time)) else {
             self.counts.refused += 1;
             return;
         };
-        if question.id.observer != from || too_late(block.last, question.time) {
+        if too_late(block.last, question.time) {
             self.counts.refused += 1;
             return;
         }
+        self.holding = Some((id, self.now));
         let block = block.at(&Instant { time: question.time, state });
         self.promised.insert(question.id, Promise { revision: self.revision, block });
         while self.promised.len() > MOST_OPEN {
@@ -187,36 +262,36 @@ impl Pairwise {
         out.push(Command::Send { to: from, message: Message::Answer(answer) });
     }
 
-    fn decide(&mut self, from: RobotId, answer: &Answer, trajectory: &NominalTrajectory, out: &mut Out) {
-        if answer.id.observer != self.robot {
-            self.counts.refused += 1;
-            return;
-        }
-        let Some(open) = self.open.get(&answer.id.number).copied().filter(|open| open.other == from) else {
-            self.counts.repeated += 1;
-            return;
-        };
-        self.open.remove(&answer.id.number);
+    fn decide(&mut self, answer: &Answer, trajectory: &NominalTrajectory, out: &mut Out) {
+        let Some((open, _)) = self.open.take() else { return };
+        // The other waits for a verdict whatever becomes of the observation.
+        let change = self.update(&open, answer, trajectory);
+        let verdict = Message::Verdict(Verdict { id: answer.id, change });
+        out.push(Command::Send { to: open.other, message: verdict });
+    }
+
+    /// The update of the pair; takes the own side, and gives what changes on the other.
+    fn update(&mut self, open: &Open, answer: &Answer, trajectory: &NominalTrajectory) -> Option<Change> {
         let (Some(block), Ok(state)) = (&self.block, trajectory.at(open.time)) else {
             self.counts.refused += 1;
-            return;
+            return None;
         };
         if too_late(block.last, open.time) {
             self.counts.refused += 1;
-            return;
+            return None;
         }
         let before = block.at(&Instant { time: open.time, state });
         let Ok(at) = measurement::of_robot(&open.relative, &before.pose(&state), &answer.pose) else {
             self.counts.refused += 1;
-            return;
+            return None;
         };
         let noise = measurement::noise_matrix(&open.noise);
         let theirs = answer.covariance.to_matrix();
-        let update = match (self.row.get(&from), &answer.factor) {
-            (None, None) => update_pair(&pair(&before.covariance, &theirs, &Matrix3::zeros()), &at, &noise),
+        let known = |cross: &Matrix3| update_pair(&pair(&before.covariance, &theirs, cross), &at, &noise);
+        let update = match (self.row.get(&open.other), &answer.factor) {
+            (None, None) => known(&Matrix3::zeros()),
             (Some(own), Some((version, other))) if own.version == Some(*version) => {
-                let cross = own.matrix * other.transpose();
-                update_pair(&pair(&before.covariance, &theirs, &cross), &at, &noise)
+                known(&(own.matrix * other.transpose()))
             }
             _ => {
                 self.counts.disagreed += 1;
@@ -225,48 +300,47 @@ impl Pairwise {
         };
         let Some(update) = update else {
             self.counts.refused += 1;
-            return;
+            return None;
         };
         if update.nis > self.gate[at.dimension - 1] {
             self.counts.rejected += 1;
-            return;
+            return None;
         }
-        let verdict = Verdict {
-            id: answer.id,
-            correction: update.corrections[1],
-            covariance: Symmetric3::from_lower(&block_of(&update.joint, 1, 1)),
-        };
         let factor = Factor { version: Some(answer.id), matrix: block_of(&update.joint, 0, 1) };
-        let own = symmetric(&block_of(&update.joint, 0, 0));
-        if self.take(&before, update.corrections[0], own, (from, factor)).is_some() {
-            out.push(Command::Send { to: from, message: Message::Verdict(verdict) });
-        }
+        let own = block_of(&update.joint, 0, 0);
+        self.take(&before, update.corrections[0], own, (open.other, factor))?;
+        let covariance = Symmetric3::from_lower(&block_of(&update.joint, 1, 1));
+        Some(Change { correction: update.corrections[1], covariance })
     }
 
     fn obey(&mut self, from: RobotId, verdict: &Verdict) {
+        if verdict.id.observer != from {
+            self.counts.refused += 1;
+            return;
+        }
+        if self.holding.is_some_and(|(id, _)| id == verdict.id) {
+            self.holding = None;
+        }
         let Some(promise) = self.promised.remove(&verdict.id) else {
             self.counts.repeated += 1;
             return;
         };
-        if verdict.id.observer != from || promise.revision != self.revision {
+        let Some(change) = &verdict.change else { return };
+        if promise.revision != self.revision {
             self.counts.refused += 1;
             return;
         }
         let factor = Factor { version: Some(verdict.id), matrix: Matrix3::identity() };
-        let covariance = verdict.covariance.to_matrix();
-        match self.take(&promise.block, verdict.correction, covariance, (from, factor)) {
+        let covariance = change.covariance.to_matrix();
+        match self.take(&promise.block, change.correction, covariance, (from, factor)) {
             Some(()) => self.counts.completed += 1,
             None => self.counts.refused += 1,
         }
     }
 }
 
-impl Core for Pairwise {
-    fn place(&mut self, at: &Instant, pose: &Pose2, noise: &Noise) {
-        self.block = Some(Block::placed(at, pose, noise));
-    }
-
-    fn absolute(&mut self, at: &Instant, quantity: &Quantity, noise: &Noise, _out: &mut Out) {
+impl Pairwise {
+    fn update_absolute(&mut self, at: &Instant, quantity: &Quantity, noise: &Noise) {
         let Some(block) = &mut self.block else { return };
         let mut moved = block.at(at);
         match moved.against_map(at, quantity, noise, &self.gate) {
@@ -283,29 +357,63 @@ impl Core for Pairwise {
             None => self.counts.refused += 1,
         }
     }
+}
 
-    fn sight(&mut self, at: &Instant, robot: RobotId, relative: &Relative, noise: &Noise, out: &mut Out) {
+impl Core for Pairwise {
+    fn place(&mut self, at: &Instant, pose: &Pose2, noise: &Noise) {
+        self.block = Some(Block::placed(at, pose, noise));
+    }
+
+    fn absolute(&mut self, at: &Instant, quantity: &Quantity, noise: &Noise, _out: &mut Out) {
+        if self.holding.is_some() {
+            self.absolute.push_back((*at, *quantity, *noise));
+        } else {
+            self.update_absolute(at, quantity, noise);
+        }
+    }
+
+    fn sight(&mut self, at: &Instant, robot: RobotId, relative: &Relative, noise: &Noise, _out: &mut Out) {
         self.counts.relative += 1;
         if self.block.is_none() {
             return;
         }
         let id = MeetingId { observer: self.robot, number: self.number };
         self.number += 1;
-        self.open.insert(id.number, Open { time: at.time, other: robot, relative: *relative, noise: *noise });
-        while self.open.len() > MOST_OPEN {
-            self.open.pop_first();
+        self.own.push_back(Open { id, time: at.time, other: robot, relative: *relative, noise: *noise });
+        if self.own.len() > MOST_OPEN {
+            self.own.pop_front();
+            self.counts.refused += 1;
         }
-        let question = Message::Question(Question { id, time: at.time });
-        out.push(Command::Send { to: robot, message: question });
+    }
+
+    fn tick(&mut self, trajectory: &NominalTrajectory, out: &mut Out) {
+        self.now = trajectory.end().0;
+        self.advance(trajectory, out);
     }
 
     fn receive(&mut self, from: RobotId, message: Message, trajectory: &NominalTrajectory, out: &mut Out) {
         match message {
-            Message::Question(question) => self.answer(from, question, trajectory, out),
-            Message::Answer(answer) => self.decide(from, &answer, trajectory, out),
+            Message::Question(question) if question.id.observer == from => {
+                self.questions.insert((question.time, question.id), from);
+                if self.questions.len() > MOST_OPEN {
+                    self.questions.pop_first();
+                    self.counts.refused += 1;
+                }
+            }
+            Message::Answer(answer) => {
+                let expected = self.open.is_some_and(|(open, _)| open.id == answer.id && open.other == from);
+                if expected {
+                    self.answered = Some(answer);
+                } else {
+                    self.counts.repeated += 1;
+                }
+            }
             Message::Verdict(verdict) => self.obey(from, &verdict),
-            Message::Sighting(_) | Message::RowAnswer(_) | Message::TeamUpdate(_) => self.counts.refused += 1,
+            Message::Question(_) | Message::Sighting(_) | Message::RowAnswer(_) | Message::TeamUpdate(_) => {
+                self.counts.refused += 1;
+            }
         }
+        self.advance(trajectory, out);
     }
 
     fn view(&self, at: &Instant) -> Option<View> {
@@ -315,6 +423,7 @@ impl Core for Pairwise {
     }
 
     fn counts(&self) -> Counts {
-        Counts { pending: self.open.len() as u64, ..self.counts }
+        let waiting = self.own.len() + self.questions.len() + self.absolute.len();
+        Counts { pending: waiting as u64 + u64::from(self.open.is_some()), ..self.counts }
     }
 }

@@ -36,6 +36,8 @@ pub(super) trait Core: Debug + Send {
     fn absolute(&mut self, at: &Instant, quantity: &Quantity, noise: &Noise, out: &mut Out);
     /// This robot saw another.
     fn sight(&mut self, at: &Instant, robot: RobotId, relative: &Relative, noise: &Noise, out: &mut Out);
+    /// The odometry has been extended, and what waited for it handled.
+    fn tick(&mut self, _trajectory: &NominalTrajectory, _out: &mut Out) {}
     /// A message whose time the odometry has reached.
     fn receive(&mut self, from: RobotId, message: Message, trajectory: &NominalTrajectory, out: &mut Out);
     /// The estimate at an instant.
@@ -219,6 +221,9 @@ impl Peer {
             },
         }
         self.catch_up(sample.time, out);
+        if let Some(trajectory) = &self.trajectory {
+            self.core.tick(trajectory, out);
+        }
         true
     }
 
