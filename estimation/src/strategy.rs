@@ -190,3 +190,6 @@ pub trait Strategy {
     /// What became of observations and messages.
     fn counts(&mut self) -> Counts;
 }
+
+#[cfg(test)]
+mod tests;

@@ -21,7 +21,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::block::{Block, Instant, apply};
 use super::fusion::least;
-use super::peer::{Core, Out, too_late};
+use super::peer::{Core, Out, Seen, too_late};
 use super::{Answer, Change, Command, Counts, Factor, MeetingId, Message, Question, Verdict, View};
 use crate::fact::{Noise, Quantity};
 use crate::geometry::{Matrix3, Vector3};
@@ -65,6 +65,8 @@ pub(super) struct Pairwise {
     absolute: VecDeque<(Instant, Quantity, Noise)>,
     /// What was answered, until the verdict.
     promised: BTreeMap<MeetingId, Promise>,
+    /// Questions heard.
+    heard: Seen,
     counts: Counts,
 }
 
@@ -170,6 +172,7 @@ impl Pairwise {
             holding: None,
             absolute: VecDeque::new(),
             promised: BTreeMap::new(),
+            heard: Seen::default(),
             counts: Counts::default(),
         }
     }
@@ -393,6 +396,8 @@ impl Core for Pairwise {
 
     fn receive(&mut self, from: RobotId, message: Message, trajectory: &NominalTrajectory, out: &mut Out) {
         match message {
+            // A second answer would promise anew what a repeated verdict then counts twice.
+            Message::Question(question) if self.heard.repeated(question.id) => self.counts.repeated += 1,
             Message::Question(question) if question.id.observer == from => {
                 self.questions.insert((question.time, question.id), from);
                 if self.questions.len() > MOST_OPEN {
