@@ -48,7 +48,7 @@ enum WireSaid {
     },
     Verdict {
         id: WireMeeting,
-        change: Option<([f64; 3], WireSymmetric)>,
+        change: Option<([f64; 3], WireSymmetric, bool)>,
     },
     RowAnswer {
         id: WireMeeting,
@@ -157,7 +157,9 @@ pub fn put(bytes: &mut Vec<u8>, said: &Said) {
         },
         Said::Verdict(verdict) => WireSaid::Verdict {
             id: verdict.id.into(),
-            change: verdict.change.map(|change| (change.correction.into(), change.covariance.0)),
+            change: verdict
+                .change
+                .map(|change| (change.correction.into(), change.covariance.0, change.agreed)),
         },
         Said::RowAnswer(answer) => {
             items.extend(answer.row.iter().map(|(robot, base)| item(*robot, base)));
@@ -214,9 +216,10 @@ pub fn take(reader: &mut Reader<'_>) -> Result<Said, ProtocolError> {
         WireSaid::Verdict { id, change } => Said::Verdict(Verdict {
             id: id.into(),
             change: match change {
-                Some((correction, covariance)) => Some(Change {
+                Some((correction, covariance, agreed)) => Some(Change {
                     correction: vector("correction", correction)?,
                     covariance: check::covariance("covariance", covariance)?,
+                    agreed,
                 }),
                 None => None,
             },

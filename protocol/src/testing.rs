@@ -263,6 +263,7 @@ pub fn strategy(rng: &mut impl Rng) -> said::Message {
             change: maybe(rng, |rng| said::Change {
                 correction: Vector3::new(number(rng), number(rng), number(rng)),
                 covariance: covariance(rng),
+                agreed: rng.random(),
             }),
         }),
         4 => said::Message::RowAnswer(said::RowAnswer {

@@ -75,8 +75,7 @@ pub struct Answer {
     pub factor: Option<(MeetingId, Matrix3)>,
 }
 
-/// "Then this is what we know now." The new factor of the robot that was seen is the identity, of the
-/// version `id`.
+/// "Then this is what we know now."
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// Which observation.
@@ -92,6 +91,9 @@ pub struct Change {
     pub correction: Vector3,
     /// Covariance after it.
     pub covariance: Symmetric3,
+    /// Whether the two now agree on their factors: that of the robot that was seen is then the identity, of
+    /// this meeting's version.
+    pub agreed: bool,
 }
 
 /// "Here, and this is my whole row."

@@ -7,8 +7,8 @@
 //! verdict is taken only if the block it rests on has not changed since the answer. If it is lost or
 //! refused, the two hold factors of different versions. Such factors are never multiplied: the pair's
 //! cross-covariance then counts as unknown, `diag(P_a/w, P_b/(1-w))` bounds the pair for every `w`, and an
-//! update from there leaves both with a cross term they agree on again, unless it would leave them worse
-//! off than before.
+//! update from there leaves both with a cross term they agree on again. Where that would leave the two worse
+//! off than before, each side is updated by covariance intersection for itself, and they go on disagreeing.
 //!
 //! Meetings that overlap would refuse one another's verdicts, so that robots take turns: one question of its
 //! own at a time, and between an answer and its verdict nothing else, for at most [`PATIENCE_S`]. Meetings
@@ -20,7 +20,7 @@ use std::collections::{BTreeMap, VecDeque};
 use nalgebra::{SMatrix, SVector};
 
 use super::block::{Block, Instant, apply};
-use super::fusion::least;
+use super::fusion::{Measured, Split, fuse_best, least};
 use super::peer::{Core, Out, Seen, too_late};
 use super::{Answer, Change, Command, Counts, Factor, MeetingId, Message, Question, Verdict, View};
 use crate::fact::{Noise, Quantity};
@@ -177,24 +177,22 @@ impl Pairwise {
         }
     }
 
-    /// Takes one side of a pair's update. `before` is the block it was computed from. Factors with third
-    /// robots are scaled by `P+ P^-1`.
+    /// Takes one side of a pair's update. `before` is the block it was computed from. Factors are scaled by
+    /// `P+ P^-1`, but for that with the partner if the two agreed on it.
     fn take(
         &mut self,
         before: &Block,
         correction: Vector3,
         covariance: Matrix3,
-        (other, factor): (RobotId, Factor),
+        agreed: Option<(RobotId, Factor)>,
     ) -> Option<()> {
         let inverse = before.covariance.cholesky()?;
         // P+ P^-1 = (P^-1 P+)^T, both symmetric.
         let scale = inverse.solve(&covariance).transpose();
-        for (robot, factor) in &mut self.row {
-            if *robot != other {
-                factor.matrix = scale * factor.matrix;
-            }
+        for factor in self.row.values_mut() {
+            factor.matrix = scale * factor.matrix;
         }
-        self.row.insert(other, factor);
+        self.row.extend(agreed);
         self.block =
             Some(Block { correction: apply(&before.correction, correction), covariance, ..*before });
         self.revision += 1;
@@ -219,6 +217,16 @@ impl Pairwise {
             }
             if self.open.is_some_and(|(_, since)| !patient(since, self.now)) {
                 self.open = None;
+                self.counts.refused += 1;
+            }
+            // What is too old would be refused by whoever hears of it.
+            while self.own.front().is_some_and(|own| too_late(self.now, own.time)) {
+                self.own.pop_front();
+                self.counts.refused += 1;
+            }
+            while let Some((turn, _)) = self.questions.first_key_value().filter(|(turn, _)| too_late(self.now, turn.0)) {
+                let turn = *turn;
+                self.questions.remove(&turn);
                 self.counts.refused += 1;
             }
             let own = self.open.map(|(open, _)| open).or(self.own.front().copied());
@@ -298,7 +306,10 @@ impl Pairwise {
             }
             _ => {
                 self.counts.disagreed += 1;
-                update_unknown(&before.covariance, &theirs, &at, &noise)
+                match update_unknown(&before.covariance, &theirs, &at, &noise) {
+                    None => return self.intersect(&before, &theirs, &at, &noise),
+                    better => better,
+                }
             }
         };
         let Some(update) = update else {
@@ -311,9 +322,42 @@ impl Pairwise {
         }
         let factor = Factor { version: Some(answer.id), matrix: block_of(&update.joint, 0, 1) };
         let own = block_of(&update.joint, 0, 0);
-        self.take(&before, update.corrections[0], own, (open.other, factor))?;
+        self.take(&before, update.corrections[0], own, Some((open.other, factor)))?;
         let covariance = Symmetric3::from_lower(&block_of(&update.joint, 1, 1));
-        Some(Change { correction: update.corrections[1], covariance })
+        Some(Change { correction: update.corrections[1], covariance, agreed: true })
+    }
+
+    /// Both sides of a pair that disagrees, each by covariance intersection for itself.
+    fn intersect(
+        &mut self,
+        before: &Block,
+        theirs: &Matrix3,
+        at: &Linearization,
+        noise: &Matrix3,
+    ) -> Option<Change> {
+        let side = |own: &Matrix3, other: &Matrix3, jacobian: Matrix3| {
+            let zero = Matrix3::zeros();
+            let prior = Split { correlated: *own, independent: zero };
+            let measured = Measured {
+                dimension: at.dimension,
+                innovation: at.innovation,
+                jacobian,
+                correlated: at.jacobian * other * at.jacobian.transpose(),
+                independent: zero,
+                noise: *noise,
+            };
+            fuse_best(&prior, &measured).filter(|fused| fused.nis <= self.gate[at.dimension - 1])
+        };
+        let own = side(&before.covariance, theirs, -at.jacobian);
+        let other = side(theirs, &before.covariance, at.jacobian);
+        if let Some(fused) = own {
+            self.take(before, fused.correction, fused.covariance, None);
+        }
+        other.map(|fused| Change {
+            correction: fused.correction,
+            covariance: Symmetric3::from_lower(&fused.covariance),
+            agreed: false,
+        })
     }
 
     fn obey(&mut self, from: RobotId, verdict: &Verdict) {
@@ -335,7 +379,8 @@ impl Pairwise {
         }
         let factor = Factor { version: Some(verdict.id), matrix: Matrix3::identity() };
         let covariance = change.covariance.to_matrix();
-        match self.take(&promise.block, change.correction, covariance, (from, factor)) {
+        let agreed = change.agreed.then_some((from, factor));
+        match self.take(&promise.block, change.correction, covariance, agreed) {
             Some(()) => self.counts.completed += 1,
             None => self.counts.refused += 1,
         }
