@@ -31,7 +31,9 @@ mod view;
 use std::fmt;
 use std::str::FromStr;
 
-pub use message::{Answer, Change, Gain, MeetingId, Message, Question, RowAnswer, Sighting, TeamUpdate, Verdict};
+pub use message::{
+    Answer, Change, Gain, MeetingId, Message, Question, RowAnswer, Sighting, TeamUpdate, Verdict,
+};
 pub use peer::{Noises, Peer, Setup};
 pub use view::{Deviation, Factor, JointView, View, error, joint_of_replica, joint_view};
 

@@ -218,7 +218,11 @@ pub struct FaultsArgs {
     /// A scenario (a TOML file, with [[fault]] tables if it has any) or a recording (a folder).
     pub input: PathBuf,
     /// Which strategies: exact, factored, pairwise, intersection, split_intersection, naive, independent.
-    #[arg(long, value_delimiter = ',', default_value = "exact,factored,pairwise,intersection,split_intersection,naive,independent")]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "exact,factored,pairwise,intersection,split_intersection,naive,independent"
+    )]
     pub strategies: Vec<StrategyKind>,
     /// Shares of messages lost during the fault, percent.
     #[arg(long, value_delimiter = ',', default_value = "0,10,30,50,70,90")]

@@ -64,9 +64,7 @@ impl Message {
                 sealed(kind::ESTIMATE, |bytes| codec::put(bytes, &WireEstimate::from(estimate)))
             }
             Self::Sample(sample) => encode_sample(sample),
-            Self::SensorBatch(batch) => {
-                sealed(kind::SENSOR_BATCH, |bytes| transfer::put_batch(bytes, batch))
-            }
+            Self::SensorBatch(batch) => sealed(kind::SENSOR_BATCH, |bytes| transfer::put_batch(bytes, batch)),
             Self::SensorAck(ack) => sealed(kind::SENSOR_ACK, |bytes| transfer::put_ack(bytes, ack)),
             Self::ControlRequest(request) => {
                 sealed(kind::CONTROL_REQUEST, |bytes| control::put_request(bytes, *request))

@@ -146,9 +146,7 @@ pub fn put(bytes: &mut Vec<u8>, said: &Said) {
             independent: (sighting.independent.0.iter().any(|entry| entry.to_bits() != 0))
                 .then_some(sighting.independent.0),
         },
-        Said::Question(question) => {
-            WireSaid::Question { id: question.id.into(), time_ns: question.time.0 }
-        }
+        Said::Question(question) => WireSaid::Question { id: question.id.into(), time_ns: question.time.0 },
         Said::Answer(answer) => WireSaid::Answer {
             id: answer.id.into(),
             pose: check::wire_pose(&answer.pose),
@@ -234,7 +232,11 @@ pub fn take(reader: &mut Reader<'_>) -> Result<Said, ProtocolError> {
         WireSaid::TeamUpdate { id, dimension, innovation, innovation_covariance } => {
             if !(1..=3).contains(&dimension) {
                 let expected = "1, 2 or 3";
-                return Err(ProtocolError::Dimension { field: "dimension".into(), found: dimension, expected });
+                return Err(ProtocolError::Dimension {
+                    field: "dimension".into(),
+                    found: dimension,
+                    expected,
+                });
             }
             let gain = |Item(robot, without_motion): Item| Gain { robot, without_motion };
             Said::TeamUpdate(TeamUpdate {

@@ -278,10 +278,7 @@ pub fn strategy(rng: &mut impl Rng) -> said::Message {
             dimension: rng.random_range(1..=3),
             innovation: Vector3::new(number(rng), number(rng), number(rng)),
             innovation_covariance: covariance(rng),
-            gains: several(rng, |rng| said::Gain {
-                robot: RobotId(small(rng)),
-                without_motion: matrix(rng),
-            }),
+            gains: several(rng, |rng| said::Gain { robot: RobotId(small(rng)), without_motion: matrix(rng) }),
         }),
     }
 }

@@ -162,10 +162,8 @@ pub fn run(
 
 impl Run {
     fn sample(&mut self, time: Timestamp, robot: RobotId, mut sample: Sample) {
-        if matches!(
-            sample.reading,
-            Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_)
-        ) {
+        if matches!(sample.reading, Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_))
+        {
             self.read.insert(robot, time);
         }
         // The world goes by the right time; the robot stamps by its own.
@@ -233,7 +231,9 @@ impl Run {
 
     fn period(&mut self, now: Timestamp) {
         let robots: Vec<_> = self.participants.keys().copied().collect();
-        robots.into_iter().for_each(|robot| self.act(robot, now, Event::Period));
+        for robot in robots {
+            self.act(robot, now, Event::Period);
+        }
         self.deliver(now);
     }
 

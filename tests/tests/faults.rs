@@ -38,7 +38,8 @@ fn row<'a>(rows: &'a [Value], strategy: &str, loss: f64) -> &'a Value {
 }
 
 fn robot_anees(row: &Value) -> f64 {
-    let robots: Vec<f64> = row["robot_anees"].as_array().unwrap().iter().map(|a| a.as_f64().unwrap()).collect();
+    let robots: Vec<f64> =
+        row["robot_anees"].as_array().unwrap().iter().map(|a| a.as_f64().unwrap()).collect();
     robots.iter().sum::<f64>() / robots.len() as f64
 }
 
@@ -46,14 +47,23 @@ fn check_healed(row: &Value) {
     assert!(number(row, "oracle_difference_healed") < 1e-9, "{row}");
     assert_eq!(row["replicas_identical"], true, "{row}");
     for key in ["facts_lost", "facts_counted_twice", "facts_pending"] {
-        assert_eq!(number(row, key), 0.0, "{key} in {row}");
+        assert_eq!(row[key], 0, "{key} in {row}");
     }
 }
 
 #[test]
 fn after_half_and_nine_tenths_burst_loss_exact_is_the_oracle_in_every_replica() {
     let rows = faults(&[
-        "--strategies", "exact", "--loss", "50,90", "--burst", "1,10,100", "--seeds", "4", "--seconds", "112",
+        "--strategies",
+        "exact",
+        "--loss",
+        "50,90",
+        "--burst",
+        "1,10,100",
+        "--seeds",
+        "4",
+        "--seconds",
+        "112",
     ]);
     assert_eq!(rows.len(), 6);
     rows.iter().for_each(check_healed);
@@ -61,7 +71,18 @@ fn after_half_and_nine_tenths_burst_loss_exact_is_the_oracle_in_every_replica() 
 
 #[test]
 fn during_half_loss_exact_stays_within_a_tenth_of_lossless_and_consistent() {
-    let rows = faults(&["--strategies", "exact", "--loss", "0,50", "--burst", "1", "--seeds", "20", "--seed", "100"]);
+    let rows = faults(&[
+        "--strategies",
+        "exact",
+        "--loss",
+        "0,50",
+        "--burst",
+        "1",
+        "--seeds",
+        "20",
+        "--seed",
+        "100",
+    ]);
     let row = row(&rows, "exact", 50.0);
     let ratio = number(row, "position_rmse_during_m") / number(row, "lossless_rmse_m");
     assert!(ratio <= 1.10, "{ratio}: {row}");
@@ -80,7 +101,7 @@ fn half_of_the_facts_of_others_lost_for_good_costs_at_most_a_tenth_and_no_consis
         scenario.duration_s = 91.0;
         let run = Team::new(&scenario, seed, Told::default()).run(&FleetOptions::default());
         let config = run.fold_config();
-        for (robot, _) in &run.outcomes {
+        for robot in run.outcomes.keys() {
             for (case, share) in [1.0, 0.5].into_iter().enumerate() {
                 let mut joint = Joint::new(config.form);
                 let mut due = times.iter();
@@ -95,12 +116,16 @@ fn half_of_the_facts_of_others_lost_for_good_costs_at_most_a_tenth_and_no_consis
                         .collect();
                     let error = run.pose_error_at(joint, *robot, time).error;
                     squares[case] += error.x * error.x + error.y * error.y;
-                    let truths =
-                        states.keys().map(|robot| (*robot, run.team.world.tracks[robot].pose_at(time))).collect();
+                    let truths = states
+                        .keys()
+                        .map(|robot| (*robot, run.team.world.tracks[robot].pose_at(time)))
+                        .collect();
                     judged.push(joint_of_replica(joint, &states).unwrap().deviation(&truths).unwrap());
                 };
                 for (key, record) in run.ledger().facts() {
-                    while let Some(time_s) = next.filter(|time_s| key.time > Timestamp::from_seconds(**time_s)) {
+                    while let Some(time_s) =
+                        next.filter(|time_s| key.time > Timestamp::from_seconds(**time_s))
+                    {
                         look(&joint, *time_s);
                         next = due.next();
                     }
@@ -222,19 +247,30 @@ fn whatever_else_goes_wrong_exact_heals_to_the_oracle() {
     std::fs::write(&plan, everything).unwrap();
     let plan = plan.display().to_string();
     let rows = faults(&[
-        "--strategies", "exact,pairwise", "--loss", "30", "--burst", "1", "--seeds", "4", "--seconds", "75", "--faults",
+        "--strategies",
+        "exact,pairwise",
+        "--loss",
+        "30",
+        "--burst",
+        "1",
+        "--seeds",
+        "4",
+        "--seconds",
+        "75",
+        "--faults",
         &plan,
     ]);
     let exact = row(&rows, "exact", 30.0);
     check_healed(exact);
     assert!(number(exact, "messages_refused") > 100.0, "{exact}");
     // The approximations go on too, and count nothing twice.
-    assert_eq!(number(row(&rows, "pairwise", 30.0), "facts_counted_twice"), 0.0);
+    assert_eq!(row(&rows, "pairwise", 30.0)["facts_counted_twice"], 0);
 }
 
 #[test]
 fn what_cannot_be_is_refused_by_name() {
-    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/faults.toml").display().to_string();
+    let scenario =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/faults.toml").display().to_string();
     let folder = tempfile::tempdir().unwrap();
     for (arguments, expected) in [
         (vec!["--loss", "120"], "--loss 120"),

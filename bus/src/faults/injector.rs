@@ -136,13 +136,11 @@ impl Injector {
                 Fault::Clock { .. } => {}
             }
         }
-        match lost {
-            Some(cause) => Verdict::Lost(cause),
-            None => {
-                let again_after_s = again_after_s.map(|later| after_s + later);
-                Verdict::Delivered { after_s, again_after_s, damage }
-            }
+        if let Some(cause) = lost {
+            return Verdict::Lost(cause);
         }
+        let again_after_s = again_after_s.map(|later| after_s + later);
+        Verdict::Delivered { after_s, again_after_s, damage }
     }
 }
 

@@ -90,9 +90,7 @@ impl Block {
         gate: &[f64; 3],
     ) -> Option<Result<(Fused, Matrix3), Rejected>> {
         let (linearization, sign) = match quantity {
-            Quantity::Absolute(absolute) => {
-                (measurement::of_map(absolute, &self.pose(&at.state)), 1.0)
-            }
+            Quantity::Absolute(absolute) => (measurement::of_map(absolute, &self.pose(&at.state)), 1.0),
             Quantity::Landmark { position_m: [x, y], relative, .. } => {
                 let seen = measurement::of_point(relative, &self.pose(&at.state), Vector2::new(*x, *y));
                 (seen.ok()?, -1.0)
@@ -114,8 +112,8 @@ impl Block {
             return Some(Err(Rejected));
         }
         let keep = Matrix3::identity() - fused.gain * measured.jacobian;
-        fused.independent = keep * self.independent * keep.transpose()
-            + fused.gain * measured.noise * fused.gain.transpose();
+        fused.independent =
+            keep * self.independent * keep.transpose() + fused.gain * measured.noise * fused.gain.transpose();
         Some(Ok((fused, keep)))
     }
 

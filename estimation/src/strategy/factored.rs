@@ -11,9 +11,7 @@ use std::collections::BTreeMap;
 use super::block::Instant;
 use super::fusion::symmetric;
 use super::peer::{Core, Out, Seen};
-use super::{
-    Command, Counts, Factor, Gain, MeetingId, Message, Question, RowAnswer, TeamUpdate, View,
-};
+use super::{Command, Counts, Factor, Gain, MeetingId, Message, Question, RowAnswer, TeamUpdate, View};
 use crate::fact::{Noise, NominalState, Quantity};
 use crate::geometry::{Matrix3, Vector2};
 use crate::joint::ErrorForm;

@@ -1,7 +1,6 @@
 //! Strategies that need no answer: the observer tells the robot it saw what it measured and what it believes
 //! of itself, and the robot that was seen updates itself alone.
 
-
 use super::block::{Block, Instant};
 use super::fusion::{self, Fused, Measured, Split};
 use super::peer::{Core, Out, Seen, too_late};
@@ -28,15 +27,7 @@ pub(super) struct OneWay {
 
 impl OneWay {
     pub fn new(robot: RobotId, kind: StrategyKind, gate: [f64; 3]) -> Self {
-        Self {
-            robot,
-            kind,
-            gate,
-            block: None,
-            number: 0,
-            seen: Seen::default(),
-            counts: Counts::default(),
-        }
+        Self { robot, kind, gate, block: None, number: 0, seen: Seen::default(), counts: Counts::default() }
     }
 
     /// What the observer's message says of this robot, by how much of it may be correlated.

@@ -140,14 +140,10 @@ fn block_of(joint: &Matrix6, row: usize, column: usize) -> Matrix3 {
 
 /// The update of a pair whose cross-covariance is unknown, with the weight that makes the product of the
 /// determinants of both blocks least; `None` if that is no less than before.
-fn update_unknown(
-    own: &Matrix3,
-    other: &Matrix3,
-    at: &Linearization,
-    noise: &Matrix3,
-) -> Option<PairUpdate> {
-    let update =
-        |weight: f64| update_pair(&pair(&(own / weight), &(other / (1.0 - weight)), &Matrix3::zeros()), at, noise);
+fn update_unknown(own: &Matrix3, other: &Matrix3, at: &Linearization, noise: &Matrix3) -> Option<PairUpdate> {
+    let update = |weight: f64| {
+        update_pair(&pair(&(own / weight), &(other / (1.0 - weight)), &Matrix3::zeros()), at, noise)
+    };
     let size = |update: &PairUpdate| {
         block_of(&update.joint, 0, 0).determinant() * block_of(&update.joint, 1, 1).determinant()
     };
@@ -193,8 +189,7 @@ impl Pairwise {
             factor.matrix = scale * factor.matrix;
         }
         self.row.extend(agreed);
-        self.block =
-            Some(Block { correction: apply(&before.correction, correction), covariance, ..*before });
+        self.block = Some(Block { correction: apply(&before.correction, correction), covariance, ..*before });
         self.revision += 1;
         self.counts.used += 1;
         Some(())
@@ -224,7 +219,9 @@ impl Pairwise {
                 self.own.pop_front();
                 self.counts.refused += 1;
             }
-            while let Some((turn, _)) = self.questions.first_key_value().filter(|(turn, _)| too_late(self.now, turn.0)) {
+            while let Some((turn, _)) =
+                self.questions.first_key_value().filter(|(turn, _)| too_late(self.now, turn.0))
+            {
                 let turn = *turn;
                 self.questions.remove(&turn);
                 self.counts.refused += 1;

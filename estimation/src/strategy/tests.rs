@@ -346,7 +346,12 @@ fn a_verdict_on_a_block_that_has_changed_is_refused() {
 
 #[test]
 fn a_repeated_message_changes_nothing() {
-    for kind in [StrategyKind::Pairwise, StrategyKind::Intersection, StrategyKind::SplitIntersection, StrategyKind::Naive] {
+    for kind in [
+        StrategyKind::Pairwise,
+        StrategyKind::Intersection,
+        StrategyKind::SplitIntersection,
+        StrategyKind::Naive,
+    ] {
         let mut team = Team::new(kind, &[A, B]);
         team.drive(100);
         let views = team.views();

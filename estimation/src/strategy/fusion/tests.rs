@@ -121,7 +121,8 @@ fn the_fused_covariance_bounds_the_worst_correlation_and_the_naive_one_does_not(
     let (a, b) = (spd(0.5), turned(&spd(0.5)));
     let prior = Split { correlated: a, independent: Matrix3::zeros() };
     let fused = fuse_best(&prior, &direct(b, Matrix3::zeros())).unwrap();
-    let naive = fuse(&Split { correlated: Matrix3::zeros(), independent: a }, &direct(Matrix3::zeros(), b), 0.5);
+    let naive =
+        fuse(&Split { correlated: Matrix3::zeros(), independent: a }, &direct(Matrix3::zeros(), b), 0.5);
     let naive = naive.unwrap();
     let (mut worst, mut worst_naive) = (f64::INFINITY, f64::INFINITY);
     for cross in extremes(&a, &b) {

@@ -146,7 +146,14 @@ fn table(args: &FaultsArgs, worlds: &[World], levels: &[Level], window: Window) 
         let lossless = of(kind, None);
         for (index, level) in levels.iter().enumerate() {
             let runs = of(kind, Some(index));
-            rows.push(rows::row(kind, (level.loss_percent, level.burst), &runs, &lossless, &exact));
+            rows.push(rows::row(
+                kind,
+                (level.loss_percent, level.burst),
+                &runs,
+                &lossless,
+                &exact,
+                !args.input.is_dir(),
+            ));
         }
     }
     Ok(rows)

@@ -31,7 +31,8 @@ pub struct Row {
     pub lossless_rmse_healed_m: Option<f64>,
     /// Mean over the judged times; none where it is undefined.
     pub joint_anees: Option<f64>,
-    /// At one time, for a consistent filter; corrected for the number of times.
+    /// At one time, for a consistent filter; corrected for the number of times. None for a recording: it is
+    /// one realization.
     pub joint_anees_interval: Option<(f64, f64)>,
     /// Whether it was in the interval at every time.
     pub joint_consistent: Option<bool>,
@@ -82,18 +83,21 @@ fn nees<'a>(runs: impl Iterator<Item = &'a [Option<Deviation>]>) -> (Option<Nees
         runs.iter().filter_map(|run| run.iter().cloned().collect::<Option<Vec<_>>>()).collect();
     let missing = all - complete.iter().map(Vec::len).sum::<usize>();
     let summary = NeesSummary::from_runs(&complete, ALPHA);
-    let indefinite = summary.iter().flat_map(|summary| &summary.times).map(|time| time.undefined).sum::<usize>();
+    let indefinite =
+        summary.iter().flat_map(|summary| &summary.times).map(|time| time.undefined).sum::<usize>();
     (summary, missing + indefinite, all)
 }
 
 /// The row of one strategy at one level; `lossless` are its runs without any fault, `truth` those of the
-/// exact strategy without any, all in the order of the seeds.
+/// exact strategy without any, all in the order of the seeds; `independent_worlds` if these are worlds of their
+/// own.
 pub fn row(
     kind: StrategyKind,
     (loss_percent, burst): (f64, f64),
     runs: &[RunScore],
     lossless: &[RunScore],
     exact: &[RunScore],
+    independent_worlds: bool,
 ) -> Row {
     let (during, during_error) = mean(runs.iter().map(|run| run.rmse_during_m));
     let (healed, healed_error) = mean(runs.iter().map(|run| run.rmse_healed_m));
@@ -106,9 +110,10 @@ pub fn row(
     let robots: Vec<Option<NeesSummary>> =
         robots.into_values().map(|runs| nees(runs.into_iter()).0).collect();
     let difference = |(run, exact): (&RunScore, &RunScore)| {
-        let apart = run.last.iter().filter_map(|(robot, pose)| {
-            Some((exact.last.get(robot)?.position() - pose.position()).norm())
-        });
+        let apart = run
+            .last
+            .iter()
+            .filter_map(|(robot, pose)| Some((exact.last.get(robot)?.position() - pose.position()).norm()));
         apart.fold(0.0, f64::max)
     };
     let oracle = if kind == StrategyKind::Exact {
@@ -137,12 +142,23 @@ pub fn row(
         lossless_rmse_m: mean(lossless.iter().map(|run| run.rmse_during_m)).0,
         lossless_rmse_healed_m: mean(lossless.iter().map(|run| run.rmse_healed_m)).0,
         joint_anees: joint.as_ref().and_then(|joint| joint.overall),
-        joint_anees_interval: joint.as_ref().and_then(|joint| Some(joint.times.first()?.interval)),
-        joint_consistent: joint.as_ref().map(NeesSummary::is_consistent),
+        joint_anees_interval: joint
+            .as_ref()
+            .filter(|_| independent_worlds)
+            .and_then(|joint| Some(joint.times.first()?.interval)),
+        joint_consistent: joint.as_ref().filter(|_| independent_worlds).map(NeesSummary::is_consistent),
         joint_undefined_percent: if all == 0 { 100.0 } else { 100.0 * undefined as f64 / all as f64 },
-        joint_least_eigenvalue_share: runs.iter().filter_map(|run| run.least_definiteness).min_by(f64::total_cmp),
+        joint_least_eigenvalue_share: runs
+            .iter()
+            .filter_map(|run| run.least_definiteness)
+            .min_by(f64::total_cmp),
         robot_anees: robots.iter().map(|robot| robot.as_ref().and_then(|robot| robot.overall)).collect(),
-        robot_anees_interval: robots.iter().flatten().next().and_then(|robot| Some(robot.times.first()?.interval)),
+        robot_anees_interval: robots
+            .iter()
+            .flatten()
+            .next()
+            .filter(|_| independent_worlds)
+            .and_then(|robot| Some(robot.times.first()?.interval)),
         oracle_difference_healed: oracle,
         replicas_identical: runs.iter().map(|run| run.identical).try_fold(true, |all, one| Some(all && one?)),
         facts_lost: runs.iter().map(|run| run.facts_lost).try_fold(0, |all, one| Some(all + one?)),

@@ -10,7 +10,7 @@ use pleiad_estimation::fact::{Body, Entry, Quantity};
 use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::reference::{JointEkf, JointEstimate, facts_from_entries};
 use pleiad_estimation::sample::Sample;
-use pleiad_estimation::strategy::{Counts, Deviation, Strategy, StrategyKind};
+use pleiad_estimation::strategy::{Counts, Deviation, JointView, Strategy, StrategyKind};
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_recording::Recording;
 use pleiad_sim_peers::strategies::{Snapshot, StrategyOptions, StrategyOutcome, run};
@@ -113,12 +113,7 @@ pub struct RunScore {
 }
 
 /// Runs a strategy on a world.
-pub fn play(
-    world: &World,
-    kind: StrategyKind,
-    plan: &FaultPlan,
-    window: Window,
-) -> anyhow::Result<RunScore> {
+pub fn play(world: &World, kind: StrategyKind, plan: &FaultPlan, window: Window) -> anyhow::Result<RunScore> {
     let options = StrategyOptions {
         seed: world.seed,
         plan: plan.clone(),
@@ -166,9 +161,8 @@ fn accuracy(score: &mut RunScore, world: &World, snapshots: &[Snapshot], window:
 fn consistency(score: &mut RunScore, world: &World, snapshots: &[Snapshot], window: Window) {
     let times = JUDGED.map(|share| window.start_s + share * (window.end_s - window.start_s));
     for time_s in times {
-        let nearest = |a: &&Snapshot, b: &&Snapshot| {
-            (a.t_s - time_s).abs().total_cmp(&(b.t_s - time_s).abs())
-        };
+        let nearest =
+            |a: &&Snapshot, b: &&Snapshot| (a.t_s - time_s).abs().total_cmp(&(b.t_s - time_s).abs());
         let Some(snapshot) = snapshots.iter().min_by(nearest) else { return };
         let truths: BTreeMap<RobotId, Pose2> = snapshot
             .views
@@ -186,7 +180,7 @@ fn consistency(score: &mut RunScore, world: &World, snapshots: &[Snapshot], wind
     }
     let known = snapshots.iter().filter_map(|snapshot| snapshot.joint.as_ref());
     let agreeing = known.filter(|joint| joint.disagreeing == 0);
-    score.least_definiteness = agreeing.map(|joint| joint.definiteness()).min_by(f64::total_cmp);
+    score.least_definiteness = agreeing.map(JointView::definiteness).min_by(f64::total_cmp);
 }
 
 /// The sums of two counts.
