@@ -169,7 +169,8 @@ pub struct Counts {
     pub counted_twice: u64,
     /// Messages that came too late to be used, or whose premise had changed.
     pub refused: u64,
-    /// Updates of pairs whose factors were of different versions (`pairwise`).
+    /// Updates of pairs whose cross-covariance counted as unknown: factors of different versions, or a pair that is
+    /// indefinite (`pairwise`).
     pub disagreed: u64,
     /// Samples that were not taken.
     pub samples_refused: u64,

@@ -295,13 +295,19 @@ impl Pairwise {
         };
         let noise = measurement::noise_matrix(&open.noise);
         let theirs = answer.covariance.to_matrix();
-        let known = |cross: &Matrix3| update_pair(&pair(&before.covariance, &theirs, cross), &at, &noise);
-        let update = match (self.row.get(&open.other), &answer.factor) {
-            (None, None) => known(&Matrix3::zeros()),
+        let cross = match (self.row.get(&open.other), &answer.factor) {
+            (None, None) => Some(Matrix3::zeros()),
             (Some(own), Some((version, other))) if own.version == Some(*version) => {
-                known(&(own.matrix * other.transpose()))
+                Some(own.matrix * other.transpose())
             }
-            _ => {
+            _ => None,
+        };
+        // The approximation of correlations with third robots can make a pair indefinite; what it says is then
+        // no covariance, and counts as unknown too.
+        let joint = cross.map(|cross| pair(&before.covariance, &theirs, &cross));
+        let update = match joint.filter(|joint| joint.cholesky().is_some()) {
+            Some(joint) => update_pair(&joint, &at, &noise),
+            None => {
                 self.counts.disagreed += 1;
                 match update_unknown(&before.covariance, &theirs, &at, &noise) {
                     None => return self.intersect(&before, &theirs, &at, &noise),

@@ -51,7 +51,7 @@ pub struct Row {
     pub facts_lost: Option<u64>,
     pub facts_counted_twice: u64,
     pub facts_pending: u64,
-    /// Updates of pairs whose factors were of different versions.
+    /// Updates of pairs whose cross-covariance counted as unknown (`pairwise`).
     pub disagreements: u64,
     /// Messages that the codec refused.
     pub messages_refused: u64,
