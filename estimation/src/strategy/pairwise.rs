@@ -305,14 +305,13 @@ impl Pairwise {
         // The approximation of correlations with third robots can make a pair indefinite; what it says is then
         // no covariance, and counts as unknown too.
         let joint = cross.map(|cross| pair(&before.covariance, &theirs, &cross));
-        let update = match joint.filter(|joint| joint.cholesky().is_some()) {
-            Some(joint) => update_pair(&joint, &at, &noise),
-            None => {
-                self.counts.disagreed += 1;
-                match update_unknown(&before.covariance, &theirs, &at, &noise) {
-                    None => return self.intersect(&before, &theirs, &at, &noise),
-                    better => better,
-                }
+        let update = if let Some(joint) = joint.filter(|joint| joint.cholesky().is_some()) {
+            update_pair(&joint, &at, &noise)
+        } else {
+            self.counts.disagreed += 1;
+            match update_unknown(&before.covariance, &theirs, &at, &noise) {
+                None => return self.intersect(&before, &theirs, &at, &noise),
+                better => better,
             }
         };
         let Some(update) = update else {
