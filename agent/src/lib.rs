@@ -8,6 +8,8 @@ pub mod driver;
 pub mod journal;
 mod node;
 pub mod results;
+pub mod strategy;
 
 pub use config::{AgentConfig, ConfigError, NodeConfig};
 pub use node::{Command, Event, Node, Notice, Record, SampleRefusal, SettledEstimate};
+pub use strategy::Participant;

@@ -1,10 +1,19 @@
 //! A network under virtual time, for fleets in one thread: rules from a packet to a [`Verdict`], seeded.
+//! [`FaultPlan`] says what goes wrong where and when, [`Injector`] applies it.
 //!
 //! Every directed link draws from a stream of its own, so that more traffic on one link does not change
 //! the luck of another; deliveries come in the order of their due time, then of sending. Equal calls on
 //! equal seeds give equal runs.
 
+mod injector;
+mod plan;
+mod read;
+
 use std::collections::BTreeMap;
+
+pub use injector::Injector;
+pub use plan::{Fault, FaultPlan, InvalidRule, Rule};
+pub use read::FaultsError;
 
 use pleiad_protocol::{RobotId, Timestamp};
 use rand::{RngExt, SeedableRng};
@@ -39,14 +48,54 @@ pub struct InvalidFaults {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     /// It is lost.
-    Lost,
+    Lost(Cause),
     /// It arrives after this many seconds, and perhaps once more.
     Delivered {
         /// Seconds under way.
         after_s: f64,
         /// Seconds under way of the second copy.
         again_after_s: Option<f64>,
+        /// What happens to its bytes.
+        damage: Option<Damage>,
     },
+}
+
+/// Why a message is lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// By chance.
+    Chance,
+    /// There is no link: one-way, a partition, out of range.
+    Cut,
+    /// The receiver is too slow and its queue full.
+    Overflow,
+}
+
+/// Bytes flipped on the way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Damage {
+    /// Decides which bytes, and how.
+    pub seed: u64,
+    /// How many at most; two flips may meet on one byte, but never undo one another.
+    pub bytes: u8,
+}
+
+impl Damage {
+    /// Flips the bytes.
+    pub fn apply(&self, bytes: &mut [u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        let before = bytes.to_vec();
+        for _ in 0..self.bytes {
+            let index = rng.random_range(0..bytes.len());
+            bytes[index] = bytes[index].wrapping_add(rng.random_range(1..=255));
+            if bytes[index] == before[index] {
+                bytes[index] ^= 1;
+            }
+        }
+    }
 }
 
 impl LinkFaults {
@@ -73,11 +122,11 @@ impl LinkFaults {
     pub fn verdict(&self, rng: &mut ChaCha8Rng) -> Verdict {
         let [lost, doubled, first, second] = [(); 4].map(|()| rng.random::<f64>());
         if lost < self.loss {
-            return Verdict::Lost;
+            return Verdict::Lost(Cause::Chance);
         }
         let after = |luck: f64| self.delay_s + luck * self.jitter_s;
         let again_after_s = (doubled < self.duplicate).then(|| after(second));
-        Verdict::Delivered { after_s: after(first), again_after_s }
+        Verdict::Delivered { after_s: after(first), again_after_s, damage: None }
     }
 }
 
@@ -111,7 +160,7 @@ impl Tally {
     }
 }
 
-/// What happened so far. `sent + duplicated = delivered + lost + cut + under way`.
+/// What happened so far. `sent + duplicated = delivered + lost + cut + overflowed + under way`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// Handed in by senders.
@@ -122,8 +171,12 @@ pub struct Traffic {
     pub delivered: Tally,
     /// Lost by chance.
     pub lost: Tally,
-    /// Dropped at a partition.
+    /// Dropped where there is no link.
     pub cut: Tally,
+    /// Dropped because the receiver is too slow.
+    pub overflowed: Tally,
+    /// Copies put under way with flipped bytes.
+    pub damaged: Tally,
 }
 
 /// A network under virtual time.
@@ -135,6 +188,8 @@ pub struct VirtualNetwork<T> {
     exceptions: BTreeMap<(RobotId, RobotId), LinkFaults>,
     /// The luck of each link that has been used.
     luck: BTreeMap<(RobotId, RobotId), ChaCha8Rng>,
+    /// The rules of a plan, on top of the faults above.
+    injector: Option<Injector>,
     /// While a partition is on: the side of every robot named in it. The others are one more side.
     sides: Option<BTreeMap<RobotId, usize>>,
     /// Under way, by due time and order of sending.
@@ -144,7 +199,7 @@ pub struct VirtualNetwork<T> {
     traffic: Traffic,
 }
 
-impl<T: Clone + AsRef<[u8]>> VirtualNetwork<T> {
+impl<T: Clone + AsRef<[u8]> + From<Vec<u8>>> VirtualNetwork<T> {
     /// A network whose links all have the same faults.
     ///
     /// # Errors
@@ -155,11 +210,17 @@ impl<T: Clone + AsRef<[u8]>> VirtualNetwork<T> {
             faults: faults.check()?,
             exceptions: BTreeMap::new(),
             luck: BTreeMap::new(),
+            injector: None,
             sides: None,
             under_way: BTreeMap::new(),
             count: 0,
             traffic: Traffic::default(),
         })
+    }
+
+    /// Puts a plan on top of the faults; second 0 of it is `origin`.
+    pub fn set_plan(&mut self, plan: FaultPlan, origin: Timestamp) {
+        self.injector = Some(Injector::new(plan, self.seed, origin));
     }
 
     /// Changes the faults of all links, those set apart included; what is under way stays so.
@@ -204,14 +265,38 @@ impl<T: Clone + AsRef<[u8]>> VirtualNetwork<T> {
             self.traffic.cut.add(bytes);
             return;
         }
-        match verdict {
-            Verdict::Lost => self.traffic.lost.add(bytes),
-            Verdict::Delivered { after_s, again_after_s } => {
-                if let Some(after_s) = again_after_s {
+        let ruled = match &mut self.injector {
+            Some(injector) => injector.judge(now, from, to, payload.as_ref()),
+            None => Verdict::Delivered { after_s: 0.0, again_after_s: None, damage: None },
+        };
+        match (verdict, ruled) {
+            (Verdict::Lost(cause), _) | (_, Verdict::Lost(cause)) => match cause {
+                Cause::Chance => self.traffic.lost.add(bytes),
+                Cause::Cut => self.traffic.cut.add(bytes),
+                Cause::Overflow => self.traffic.overflowed.add(bytes),
+            },
+            (
+                Verdict::Delivered { after_s, again_after_s, .. },
+                Verdict::Delivered { after_s: later_s, again_after_s: again_later_s, damage },
+            ) => {
+                let payload = match damage {
+                    None => payload,
+                    Some(damage) => {
+                        self.traffic.damaged.add(bytes);
+                        let mut bytes = payload.as_ref().to_vec();
+                        damage.apply(&mut bytes);
+                        T::from(bytes)
+                    }
+                };
+                let copies = [
+                    again_after_s.map(|again_s| again_s + later_s),
+                    again_later_s.map(|again_s| after_s + again_s),
+                ];
+                for again_s in copies.into_iter().flatten() {
                     self.traffic.duplicated.add(bytes);
-                    self.put(now.plus_seconds(after_s), Delivery { from, to, payload: payload.clone() });
+                    self.put(now.plus_seconds(again_s), Delivery { from, to, payload: payload.clone() });
                 }
-                self.put(now.plus_seconds(after_s), Delivery { from, to, payload });
+                self.put(now.plus_seconds(after_s + later_s), Delivery { from, to, payload });
             }
         }
     }

@@ -12,7 +12,7 @@ mod traits;
 mod zenoh_bus;
 mod zenoh_config;
 
-pub use faults::{LinkFaults, VirtualNetwork};
+pub use faults::{FaultPlan, FaultsError, Injector, LinkFaults, VirtualNetwork};
 pub use memory::{MemoryBus, MemoryNetwork, MemoryToken};
 pub use traits::{Bus, BusError, Incoming, Liveliness, Query};
 pub use zenoh_bus::{ZenohBus, ZenohToken};

@@ -77,6 +77,11 @@ impl Joint {
         Self { form, members: Vec::new(), covariance: JointCovariance::default(), updates: 0 }
     }
 
+    /// In which coordinates the error is Gaussian.
+    pub fn form(&self) -> ErrorForm {
+        self.form
+    }
+
     /// How many measurements went into it.
     pub fn updates(&self) -> u64 {
         self.updates

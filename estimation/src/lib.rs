@@ -20,6 +20,7 @@ pub mod observability;
 pub mod reference;
 pub mod sample;
 pub mod statistics;
+pub mod strategy;
 pub mod symmetric;
 
 pub use geometry::Pose2;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{LandmarkId, RobotId};
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
@@ -28,6 +29,8 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// What physics the nominal model leaves out: where, what, how sure, and the corrected model.
     Diagnose(DiagnoseArgs),
+    /// What loss and partitions do to each strategy: the table of strategies by fault level.
+    Faults(FaultsArgs),
     /// The physics a simulation can leave out: names, parameters, equations.
     Effects(EffectsArgs),
     /// One robot's agent.
@@ -206,6 +209,52 @@ pub struct DiagnoseArgs {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// The object of findings.json on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct FaultsArgs {
+    /// A scenario (a TOML file, with [[fault]] tables if it has any) or a recording (a folder).
+    pub input: PathBuf,
+    /// Which strategies: exact, factored, pairwise, intersection, split_intersection, naive, independent.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "exact,factored,pairwise,intersection,split_intersection,naive,independent"
+    )]
+    pub strategies: Vec<StrategyKind>,
+    /// Shares of messages lost during the fault, percent.
+    #[arg(long, value_delimiter = ',', default_value = "0,10,30,50,70,90")]
+    pub loss: Vec<f64>,
+    /// Mean number of messages lost in a row; 1 is independent loss.
+    #[arg(long, value_delimiter = ',', default_value = "1,10,100")]
+    pub burst: Vec<f64>,
+    /// How many seeds: worlds of a scenario, and lucks of the network.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub seeds: u64,
+    /// The first seed; a scenario's own if absent.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// A file with [[fault]] tables, in place of those of the scenario.
+    #[arg(long)]
+    pub faults: Option<PathBuf>,
+    /// Which landmarks of a recording are known: known, none, or numbers as in 6,7.
+    #[arg(long, default_value = "known")]
+    pub landmarks: LandmarksArg,
+    /// Position fixes of a recording made from ground truth, as in 1@1.0:0.3. Repeatable.
+    #[arg(long, value_name = "ROBOT@HZ:SIGMA_M")]
+    pub absolute: Vec<AbsoluteArg>,
+    /// Begin a recording this many seconds into the time that all robots cover.
+    #[arg(long, default_value_t = 0.0)]
+    pub start: f64,
+    /// Only this many seconds from the start.
+    #[arg(long)]
+    pub seconds: Option<f64>,
+    /// Folder for the report and the table; a new one under runs/ if absent.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// One JSON object on stdout.
     #[arg(long)]
     pub json: bool,
 }

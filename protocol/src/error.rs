@@ -28,6 +28,14 @@ pub enum ProtocolError {
         /// What was found.
         found: u8,
     },
+    /// The bytes are not those that were sent.
+    #[error("checksum {found:08x}, expected {expected:08x}: the message was damaged on its way")]
+    Checksum {
+        /// At the end of the message.
+        found: u32,
+        /// Of the bytes before it.
+        expected: u32,
+    },
     /// A kind of message that does not exist.
     #[error("unknown message kind {found}")]
     Kind {

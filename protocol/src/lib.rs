@@ -12,6 +12,7 @@ pub mod keys;
 pub mod limits;
 mod message;
 mod messages;
+mod strategy;
 #[cfg(any(test, feature = "testing"))]
 #[doc(hidden)]
 pub mod testing;

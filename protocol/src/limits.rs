@@ -2,7 +2,9 @@
 //! message beyond them is encoded all the same, but every receiver refuses it, so senders split before.
 
 /// Version of the wire format, the first byte of every message.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
+/// The checksum at the end of every message, bytes.
+pub const CHECKSUM_BYTES: usize = 4;
 /// Longest message, bytes.
 pub const MESSAGE_BYTES: usize = 1 << 20;
 /// Most entries in one message; longer lists are sent in chunks.
@@ -11,6 +13,8 @@ pub const ENTRIES: usize = 512;
 pub const EXTENSION_BYTES: usize = 256;
 /// Most logs in a status.
 pub const LOGS: usize = 4096;
+/// Most robots in a row or a list of gains.
+pub const ROW: usize = 1024;
 /// Most ranges in one request for facts.
 pub const RANGES: usize = 4096;
 /// Most samples in a batch.

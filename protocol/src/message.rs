@@ -2,6 +2,7 @@
 
 use pleiad_estimation::fact::Entry;
 use pleiad_estimation::sample::Sample;
+use pleiad_estimation::strategy;
 
 use crate::codec::{self, Reader};
 use crate::error::ProtocolError;
@@ -31,6 +32,8 @@ pub enum Message {
     ControlRequest(ControlRequest),
     /// Its answer.
     ControlReply(ControlReply),
+    /// What an approximate strategy says.
+    Strategy(strategy::Message),
 }
 
 /// The second byte of a message. Numbers are never reused.
@@ -44,6 +47,7 @@ mod kind {
     pub const SENSOR_ACK: u8 = 7;
     pub const CONTROL_REQUEST: u8 = 8;
     pub const CONTROL_REPLY: u8 = 9;
+    pub const STRATEGY: u8 = 10;
 }
 
 impl Message {
@@ -52,42 +56,23 @@ impl Message {
     pub fn encode(&self) -> Vec<u8> {
         match self {
             Self::Entries(entries) => encode_entries(entries),
-            Self::Status(status) => {
-                let mut bytes = begin(kind::STATUS);
-                status::put_status(&mut bytes, status);
-                bytes
-            }
+            Self::Status(status) => sealed(kind::STATUS, |bytes| status::put_status(bytes, status)),
             Self::FactsRequest(request) => {
-                let mut bytes = begin(kind::FACTS_REQUEST);
-                transfer::put_request(&mut bytes, request);
-                bytes
+                sealed(kind::FACTS_REQUEST, |bytes| transfer::put_request(bytes, request))
             }
             Self::Estimate(estimate) => {
-                let mut bytes = begin(kind::ESTIMATE);
-                codec::put(&mut bytes, &WireEstimate::from(estimate));
-                bytes
+                sealed(kind::ESTIMATE, |bytes| codec::put(bytes, &WireEstimate::from(estimate)))
             }
             Self::Sample(sample) => encode_sample(sample),
-            Self::SensorBatch(batch) => {
-                let mut bytes = begin(kind::SENSOR_BATCH);
-                transfer::put_batch(&mut bytes, batch);
-                bytes
-            }
-            Self::SensorAck(ack) => {
-                let mut bytes = begin(kind::SENSOR_ACK);
-                transfer::put_ack(&mut bytes, ack);
-                bytes
-            }
+            Self::SensorBatch(batch) => sealed(kind::SENSOR_BATCH, |bytes| transfer::put_batch(bytes, batch)),
+            Self::SensorAck(ack) => sealed(kind::SENSOR_ACK, |bytes| transfer::put_ack(bytes, ack)),
             Self::ControlRequest(request) => {
-                let mut bytes = begin(kind::CONTROL_REQUEST);
-                control::put_request(&mut bytes, *request);
-                bytes
+                sealed(kind::CONTROL_REQUEST, |bytes| control::put_request(bytes, *request))
             }
             Self::ControlReply(reply) => {
-                let mut bytes = begin(kind::CONTROL_REPLY);
-                control::put_reply(&mut bytes, reply);
-                bytes
+                sealed(kind::CONTROL_REPLY, |bytes| control::put_reply(bytes, reply))
             }
+            Self::Strategy(said) => sealed(kind::STRATEGY, |bytes| crate::strategy::put(bytes, said)),
         }
     }
 
@@ -105,6 +90,13 @@ impl Message {
         if version != limits::VERSION {
             return Err(ProtocolError::Version { found: version });
         }
+        let Some((body, checksum)) = body.split_last_chunk::<{ limits::CHECKSUM_BYTES }>() else {
+            return Err(ProtocolError::TooShort { bytes: bytes.len() });
+        };
+        let (found, expected) = (u32::from_le_bytes(*checksum), checksum_of(kind, body));
+        if found != expected {
+            return Err(ProtocolError::Checksum { found, expected });
+        }
         let mut reader = Reader::new(body);
         let message = match kind {
             kind::ENTRIES => Self::Entries(reader.list::<WireEntry, _>("entries", limits::ENTRIES)?),
@@ -116,6 +108,7 @@ impl Message {
             kind::SENSOR_ACK => Self::SensorAck(transfer::take_ack(&mut reader)?),
             kind::CONTROL_REQUEST => Self::ControlRequest(control::take_request(&mut reader)?),
             kind::CONTROL_REPLY => Self::ControlReply(control::take_reply(&mut reader)?),
+            kind::STRATEGY => Self::Strategy(crate::strategy::take(&mut reader)?),
             found => return Err(ProtocolError::Kind { found }),
         };
         reader.end()?;
@@ -134,15 +127,46 @@ impl Message {
             Self::SensorAck(_) => "sensor ack",
             Self::ControlRequest(_) => "control request",
             Self::ControlReply(_) => "control reply",
+            Self::Strategy(_) => "strategy",
         }
     }
+
+    /// The kind of the message in `bytes` in words, as [`Message::kind`], from its second byte alone; `None`
+    /// if there is no such kind.
+    pub fn kind_of(bytes: &[u8]) -> Option<&'static str> {
+        Some(match *bytes.get(1)? {
+            kind::ENTRIES => "entries",
+            kind::STATUS => "status",
+            kind::FACTS_REQUEST => "facts request",
+            kind::ESTIMATE => "estimate",
+            kind::SAMPLE => "sample",
+            kind::SENSOR_BATCH => "sensor batch",
+            kind::SENSOR_ACK => "sensor ack",
+            kind::CONTROL_REQUEST => "control request",
+            kind::CONTROL_REPLY => "control reply",
+            kind::STRATEGY => "strategy",
+            _ => return None,
+        })
+    }
+
+    /// All kinds, in words.
+    pub const KINDS: [&str; 10] = [
+        "entries",
+        "status",
+        "facts request",
+        "estimate",
+        "sample",
+        "sensor batch",
+        "sensor ack",
+        "control request",
+        "control reply",
+        "strategy",
+    ];
 }
 
 /// A message of entries; at most [`limits::ENTRIES`], longer lists are sent in chunks.
 pub fn encode_entries(entries: &[Entry]) -> Vec<u8> {
-    let mut bytes = begin(kind::ENTRIES);
-    codec::put_list(&mut bytes, entries.iter().map(WireEntry::from));
-    bytes
+    sealed(kind::ENTRIES, |bytes| codec::put_list(bytes, entries.iter().map(WireEntry::from)))
 }
 
 /// The entries of a message of entries.
@@ -158,9 +182,7 @@ pub fn decode_entries(bytes: &[u8]) -> Result<Vec<Entry>, ProtocolError> {
 
 /// A message of one sample.
 pub fn encode_sample(sample: &Sample) -> Vec<u8> {
-    let mut bytes = begin(kind::SAMPLE);
-    codec::put(&mut bytes, &WireSample::from(sample));
-    bytes
+    sealed(kind::SAMPLE, |bytes| codec::put(bytes, &WireSample::from(sample)))
 }
 
 /// The sample of a message of one sample.
@@ -174,8 +196,22 @@ pub fn decode_sample(bytes: &[u8]) -> Result<Sample, ProtocolError> {
     }
 }
 
-fn begin(kind: u8) -> Vec<u8> {
-    vec![limits::VERSION, kind]
+/// Version and kind, what `body` writes, and the checksum.
+fn sealed(kind: u8, body: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let mut bytes = vec![limits::VERSION, kind];
+    body(&mut bytes);
+    let checksum = checksum_of(kind, &bytes[2..]);
+    bytes.extend_from_slice(&checksum.to_le_bytes());
+    bytes
+}
+
+/// CRC-32 of kind and body: finds every damage of up to 32 bits in a row, and all but one in four thousand
+/// million of any other. The version is checked by itself.
+fn checksum_of(kind: u8, body: &[u8]) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&[kind]);
+    hasher.update(body);
+    hasher.finalize()
 }
 
 #[cfg(test)]

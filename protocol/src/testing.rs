@@ -7,7 +7,9 @@ use pleiad_estimation::fact::{
     Absolute, Answer, Body, Boot, ClockMap, Continuation, Entry, EntryId, Fingerprint, Half, LogId, Noise,
     NoiseRef, NominalState, Observation, Profile, Quantity, VoidReason,
 };
+use pleiad_estimation::geometry::{Matrix3, Vector3};
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
+use pleiad_estimation::strategy as said;
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timestamp};
 use rand::{Rng, RngExt};
@@ -226,9 +228,65 @@ fn text(rng: &mut impl Rng) -> String {
     (0..length).map(|_| rng.random::<char>()).collect()
 }
 
+fn meeting(rng: &mut impl Rng) -> said::MeetingId {
+    said::MeetingId { observer: RobotId(small(rng)), number: integer(rng) }
+}
+
+fn matrix(rng: &mut impl Rng) -> Matrix3 {
+    Matrix3::from_fn(|_, _| number(rng))
+}
+
+/// What an approximate strategy may say.
+pub fn strategy(rng: &mut impl Rng) -> said::Message {
+    match rng.random_range(0..6) {
+        0 => {
+            let (relative, dimension) = relative(rng);
+            said::Message::Sighting(said::Sighting {
+                id: meeting(rng),
+                time: time(rng),
+                relative,
+                noise: noise(rng, dimension),
+                pose: pose(rng),
+                correlated: covariance(rng),
+                independent: covariance(rng),
+            })
+        }
+        1 => said::Message::Question(said::Question { id: meeting(rng), time: time(rng) }),
+        2 => said::Message::Answer(said::Answer {
+            id: meeting(rng),
+            pose: pose(rng),
+            covariance: covariance(rng),
+            factor: maybe(rng, |rng| (meeting(rng), matrix(rng))),
+        }),
+        3 => said::Message::Verdict(said::Verdict {
+            id: meeting(rng),
+            change: maybe(rng, |rng| said::Change {
+                correction: Vector3::new(number(rng), number(rng), number(rng)),
+                covariance: covariance(rng),
+                agreed: rng.random(),
+            }),
+        }),
+        4 => said::Message::RowAnswer(said::RowAnswer {
+            id: meeting(rng),
+            pose: pose(rng),
+            covariance: covariance(rng),
+            motion: matrix(rng),
+            row: several(rng, |rng| (RobotId(small(rng)), matrix(rng))),
+        }),
+        _ => said::Message::TeamUpdate(said::TeamUpdate {
+            id: meeting(rng),
+            dimension: rng.random_range(1..=3),
+            innovation: Vector3::new(number(rng), number(rng), number(rng)),
+            innovation_covariance: covariance(rng),
+            gains: several(rng, |rng| said::Gain { robot: RobotId(small(rng)), without_motion: matrix(rng) }),
+        }),
+    }
+}
+
 /// Any message.
 pub fn message(rng: &mut impl Rng) -> Message {
-    match rng.random_range(0..9) {
+    match rng.random_range(0..10) {
+        9 => Message::Strategy(strategy(rng)),
         0 => Message::Entries(several(rng, |rng| entry(rng))),
         1 => Message::Status(status(rng)),
         2 => Message::FactsRequest(FactsRequest {

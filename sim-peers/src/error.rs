@@ -62,6 +62,9 @@ pub enum Error {
         /// What would be accepted.
         expected: String,
     },
+    /// A `[[fault]]` that makes no sense.
+    #[error(transparent)]
+    Fault(#[from] pleiad_bus::FaultsError),
     /// Automatic placement found no free place.
     #[error(
         "no start for robot {robot} at {separation_m} m from the other robots in {attempts} attempts; \

@@ -184,7 +184,7 @@ fn every_message_is_accounted_for() {
         network.send(at(0.0), A, C, payload(number));
     }
     let delivered = network.poll(at(0.2)).len() as u64;
-    let Traffic { sent, duplicated, delivered: out, lost, cut } = network.traffic();
+    let Traffic { sent, duplicated, delivered: out, lost, cut, .. } = network.traffic();
     assert_eq!((sent.messages, sent.bytes, cut.messages), (2000, 8000, 1000));
     assert_eq!(out.messages, delivered);
     let under_way = network.under_way() as u64;

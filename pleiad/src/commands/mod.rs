@@ -5,6 +5,7 @@ mod coordinator;
 mod demo;
 mod diagnose;
 mod effects;
+mod faults;
 mod observability;
 mod replay;
 mod run;
@@ -24,6 +25,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Observability(args) => observability::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
+        Command::Faults(args) => faults::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Agent(args) => agent::run(&args),
         Command::Coordinator(args) => coordinator::run(&args),

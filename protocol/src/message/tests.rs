@@ -56,12 +56,13 @@ fn every_kind_of_message_round_trips_bit_exactly() {
         let message = testing::message(&mut rng(seed));
         kinds.insert(message.kind());
         let bytes = message.encode();
+        assert_eq!(Message::kind_of(&bytes), Some(message.kind()));
         let decoded = Message::decode(&bytes).unwrap_or_else(|refused| panic!("seed {seed}: {refused}"));
         assert_eq!(decoded, message, "seed {seed}");
         // Equality of numbers does not tell -0.0 from 0.0; bytes do.
         assert_eq!(decoded.encode(), bytes, "seed {seed}");
     }
-    assert_eq!(kinds.len(), 9, "{kinds:?}");
+    assert_eq!(kinds.len(), 10, "{kinds:?}");
 }
 
 #[test]

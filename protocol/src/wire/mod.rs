@@ -1,10 +1,10 @@
 //! The shapes of the bytes: private mirrors of the domain types and the checks on the way back.
 
-mod check;
+pub mod check;
 pub mod control;
 mod entry;
 mod estimate;
-mod sample;
+pub mod sample;
 pub mod status;
 pub mod transfer;
 

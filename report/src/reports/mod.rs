@@ -2,6 +2,7 @@
 
 mod demo;
 pub(crate) mod diagnose;
+mod faults;
 mod replay;
 
 pub use demo::{DemoCase, DemoReport, demo_report};
@@ -9,6 +10,7 @@ pub use diagnose::{
     Claim, DiagnoseReport, DiagnosedRecording, Evidence, Found, HorizonError, NotTested, ParameterEstimate,
     ResidualColumns, RobotRollOut, STAGES, SmallestDetectable, StageTest, diagnose_report,
 };
+pub use faults::{FaultsReport, FaultsRow, faults_report};
 pub use replay::{FactCount, ReplayReport, RobotScore, replay_report, run_report};
 
 /// Caption of what a map shows, shared by all reports.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use pleiad_bus::FaultPlan;
 use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_physics::ActiveEffect;
 use pleiad_recording::EffectSpec;
@@ -45,6 +46,9 @@ pub(super) struct Document {
     defaults: Table,
     #[serde(default)]
     robots: Vec<Table>,
+    /// Read by [`FaultPlan::from_toml`].
+    #[serde(default)]
+    fault: Vec<Table>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -81,6 +85,7 @@ impl Document {
             landmarks: vec![Landmark { id: 0, x_m: 0.0, y_m: 0.0 }],
             defaults,
             robots: vec![robot],
+            fault: Vec::new(),
         }
     }
 }
@@ -103,11 +108,12 @@ impl Scenario {
     /// written out, its line.
     pub fn from_toml(text: &str, file: &str) -> Result<Self, Error> {
         let lines = keys::check(text, file)?;
+        let faults = FaultPlan::from_toml(text, file)?;
         let document: Document = toml::from_str(text).map_err(|error| Error::Syntax {
             place: keys::place(file, error.span().map(|span| 1 + text[..span.start].matches('\n').count())),
             message: error.message().to_owned(),
         })?;
-        Loader { file, lines }.scenario(document)
+        Loader { file, lines }.scenario(document, faults)
     }
 }
 
@@ -117,7 +123,7 @@ struct Loader<'a> {
 }
 
 impl Loader<'_> {
-    fn scenario(&self, document: Document) -> Result<Scenario, Error> {
+    fn scenario(&self, document: Document, faults: FaultPlan) -> Result<Scenario, Error> {
         let seed = u64::try_from(document.seed)
             .map_err(|_| self.error("seed", &document.seed, "a whole number from 0"))?;
         let mut robots = BTreeMap::new();
@@ -156,6 +162,7 @@ impl Loader<'_> {
             landmarks,
             random_landmarks: document.random_landmarks,
             robots,
+            faults,
         };
         scenario.check().map_err(|invalid| self.locate(invalid, &listed))?;
         Ok(scenario)

@@ -10,6 +10,7 @@ mod validate;
 
 use std::collections::BTreeMap;
 
+use pleiad_bus::FaultPlan;
 use pleiad_estimation::{LandmarkId, RobotId};
 use serde::{Deserialize, Serialize};
 
@@ -43,6 +44,8 @@ pub struct Scenario {
     pub random_landmarks: u32,
     /// The team.
     pub robots: BTreeMap<RobotId, RobotSettings>,
+    /// What goes wrong with messages and clocks, where a run has a network: `[[fault]]`.
+    pub faults: FaultPlan,
 }
 
 /// The rectangle the robots move in, centred on the origin of the map.

@@ -13,6 +13,11 @@ fn refusal(entry: &Entry) -> ProtocolError {
     *cause
 }
 
+/// A message whose body was written by hand, with the checksum that belongs to it.
+fn by_hand(kind: u8, body: &[u8]) -> Vec<u8> {
+    sealed(kind, |bytes| bytes.extend_from_slice(body))
+}
+
 fn number_refused(cause: ProtocolError) -> (String, f64) {
     let ProtocolError::Number { field, found, .. } = cause else { panic!("not a number: {cause}") };
     (field, found)
@@ -56,13 +61,15 @@ fn texts_are_cut_when_sent_and_refused_when_too_long() {
     assert_eq!(Message::decode(&sent), Ok(Message::SensorAck(ack(limits::TEXT_BYTES))));
 
     // Written by hand: number, accepted, refused, Some, length 513 as a varint, text.
-    let mut bytes = vec![limits::VERSION, kind::SENSOR_ACK, 0, 0, 0, 1, 251, 1, 2];
-    bytes.extend_from_slice(&[b'x'; 513]);
+    let mut body = vec![0, 0, 0, 1, 251, 1, 2];
+    body.extend_from_slice(&[b'x'; 513]);
+    let bytes = by_hand(kind::SENSOR_ACK, &body);
     let error = ProtocolError::TooMany { field: "first_refusal".into(), found: 513, limit: 512 };
     assert_eq!(Message::decode(&bytes), Err(error));
 
-    let mut bytes = vec![limits::VERSION, kind::CONTROL_REPLY, 2, 251, 1, 2];
-    bytes.extend_from_slice(&[b'x'; 513]);
+    let mut body = vec![2, 251, 1, 2];
+    body.extend_from_slice(&[b'x'; 513]);
+    let bytes = by_hand(kind::CONTROL_REPLY, &body);
     let error = ProtocolError::TooMany { field: "refused".into(), found: 513, limit: 512 };
     assert_eq!(Message::decode(&bytes), Err(error));
 }
@@ -70,19 +77,24 @@ fn texts_are_cut_when_sent_and_refused_when_too_long() {
 #[test]
 fn the_frame_of_a_message_is_checked() {
     let good = Message::ControlRequest(ControlRequest::Finish).encode();
-    assert_eq!(good, [1, 8, 1]);
+    // The checksum is zlib.crc32(b"\x08\x01"), little-endian.
+    assert_eq!(good, [2, 8, 1, 97, 168, 7, 254]);
     assert_eq!(Message::decode(&[]), Err(ProtocolError::TooShort { bytes: 0 }));
-    assert_eq!(Message::decode(&[1]), Err(ProtocolError::TooShort { bytes: 1 }));
-    assert_eq!(Message::decode(&[2, 8, 1]), Err(ProtocolError::Version { found: 2 }));
-    assert_eq!(Message::decode(&[1, 0, 1]), Err(ProtocolError::Kind { found: 0 }));
-    assert_eq!(Message::decode(&[1, 10, 1]), Err(ProtocolError::Kind { found: 10 }));
-    assert_eq!(Message::decode(&[1, 8, 1, 0, 0]), Err(ProtocolError::Trailing { bytes: 2 }));
-    for malformed in [vec![1, 8], vec![1, 8, 3]] {
+    assert_eq!(Message::decode(&[2]), Err(ProtocolError::TooShort { bytes: 1 }));
+    assert_eq!(Message::decode(&[2, 8, 1]), Err(ProtocolError::TooShort { bytes: 3 }));
+    assert_eq!(Message::decode(&[1, 8, 1]), Err(ProtocolError::Version { found: 1 }));
+    let damaged = Message::decode(&[2, 8, 2, 97, 168, 7, 254]);
+    assert!(matches!(damaged, Err(ProtocolError::Checksum { found: 0xfe07_a861, .. })), "{damaged:?}");
+    for unknown in [0, 11] {
+        assert_eq!(Message::decode(&by_hand(unknown, &[1])), Err(ProtocolError::Kind { found: unknown }));
+    }
+    assert_eq!(Message::decode(&by_hand(8, &[1, 0, 0])), Err(ProtocolError::Trailing { bytes: 2 }));
+    for malformed in [by_hand(8, &[]), by_hand(8, &[3])] {
         let refused = Message::decode(&malformed);
         assert!(matches!(refused, Err(ProtocolError::Malformed { part: "control request", .. })));
     }
     let bytes = limits::MESSAGE_BYTES + 1;
-    let refused = Message::decode(&vec![1; bytes]);
+    let refused = Message::decode(&vec![2; bytes]);
     assert_eq!(refused, Err(ProtocolError::TooLong { bytes, limit: limits::MESSAGE_BYTES }));
     let other = ProtocolError::OtherKind { found: "control request", expected: "entries" };
     assert_eq!(decode_entries(&good), Err(other));
@@ -93,13 +105,14 @@ fn the_frame_of_a_message_is_checked() {
 #[test]
 fn a_yaw_that_would_be_wrapped_is_refused() {
     let pose = |yaw_rad: f64| {
-        let mut bytes = encode_sample(&Sample {
+        let bytes = encode_sample(&Sample {
             time: Timestamp(0),
             reading: Reading::Increment(Pose2::new(1.0, 2.0, 0.0)),
         });
-        let end = bytes.len();
-        bytes[end - 8..].copy_from_slice(&yaw_rad.to_le_bytes());
-        decode_sample(&bytes)
+        let mut body = bytes[2..bytes.len() - limits::CHECKSUM_BYTES].to_vec();
+        let end = body.len();
+        body[end - 8..].copy_from_slice(&yaw_rad.to_le_bytes());
+        decode_sample(&by_hand(kind::SAMPLE, &body))
     };
     assert!(pose(PI).is_ok());
     assert!(pose((-PI).next_up()).is_ok());

@@ -1,0 +1,154 @@
+//! What strategies are compared by: each robot's estimate, the joint covariance they hold between them, and
+//! the errors of both.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::MeetingId;
+use crate::fact::NominalState;
+use crate::geometry::{Matrix3, Vector3, wrap_angle};
+use crate::joint::{ErrorForm, Joint};
+use crate::{Pose2, RobotId, Timestamp};
+
+/// A robot's estimate of itself at its last odometry.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// When.
+    pub time: Timestamp,
+    /// `map_from_robot`.
+    pub pose: Pose2,
+    /// Which error the covariance and the factors speak of.
+    pub form: ErrorForm,
+    /// Its covariance.
+    pub covariance: Matrix3,
+    /// Its factors of the correlations with others, where the strategy keeps any: `P_ij = s_ij s_ji^T`.
+    pub row: BTreeMap<RobotId, Factor>,
+}
+
+/// One robot's factor of a correlation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factor {
+    /// The meeting at which it was agreed on; factors of different versions must not be multiplied.
+    /// `None` where the strategy has no versions.
+    pub version: Option<MeetingId>,
+    /// `s_ij`.
+    pub matrix: Matrix3,
+}
+
+/// An error and the covariance that was stated for it, as [`crate::statistics::NeesSummary`] takes them.
+pub type Deviation = (DVector<f64>, DMatrix<f64>);
+
+/// The true pose less the estimated one: `log(X Xhat^-1)`, or the differences of the coordinates.
+pub fn error(form: ErrorForm, truth: &Pose2, estimate: &Pose2) -> Vector3 {
+    match form {
+        ErrorForm::Invariant => truth.compose(&estimate.inverse()).log(),
+        ErrorForm::Additive => {
+            let offset = truth.position() - estimate.position();
+            Vector3::new(offset.x, offset.y, wrap_angle(truth.yaw_rad() - estimate.yaw_rad()))
+        }
+    }
+}
+
+impl View {
+    /// The covariance of position in the map and yaw.
+    pub fn published(&self) -> Matrix3 {
+        match self.form {
+            ErrorForm::Additive => self.covariance,
+            ErrorForm::Invariant => {
+                let m = self.pose.additive_from_invariant();
+                m * self.covariance * m.transpose()
+            }
+        }
+    }
+
+    /// The error, with the covariance stated for it.
+    pub fn deviation(&self, truth: &Pose2) -> Deviation {
+        let error = error(self.form, truth, &self.pose);
+        let covariance = DMatrix::from_column_slice(3, 3, self.covariance.as_slice());
+        (DVector::from_column_slice(error.as_slice()), covariance)
+    }
+}
+
+/// The joint estimate that a team holds between its members.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointView {
+    /// Which error the covariance speaks of.
+    pub form: ErrorForm,
+    /// The robots and their poses, in the order of their blocks.
+    pub robots: Vec<(RobotId, Pose2)>,
+    /// 3 rows each.
+    pub covariance: DMatrix<f64>,
+    /// Pairs whose factors are of different versions: their cross term is unknown, and zero here.
+    pub disagreeing: usize,
+}
+
+impl JointView {
+    /// The error of the whole team, with the covariance stated for it. `None` if a robot has no truth.
+    pub fn deviation(&self, truth: &BTreeMap<RobotId, Pose2>) -> Option<Deviation> {
+        let mut errors = DVector::zeros(3 * self.robots.len());
+        for (index, (robot, pose)) in self.robots.iter().enumerate() {
+            let error = error(self.form, truth.get(robot)?, pose);
+            errors.fixed_rows_mut::<3>(3 * index).copy_from(&error);
+        }
+        Some((errors, self.covariance.clone()))
+    }
+
+    /// The least eigenvalue of the covariance over the largest: negative if it is indefinite.
+    pub fn definiteness(&self) -> f64 {
+        let eigenvalues = self.covariance.clone().symmetric_eigenvalues();
+        eigenvalues.min() / eigenvalues.max()
+    }
+}
+
+/// Puts the rows of all robots together. The result need not be positive definite: only a strategy that
+/// is exact guarantees that. `None` without a robot.
+pub fn joint_view(views: &BTreeMap<RobotId, View>) -> Option<JointView> {
+    let form = views.values().next()?.form;
+    let robots = views.iter().map(|(robot, view)| (*robot, view.pose)).collect();
+    let mut covariance = DMatrix::zeros(3 * views.len(), 3 * views.len());
+    let mut disagreeing = 0;
+    for (i, (robot, view)) in views.iter().enumerate() {
+        covariance.fixed_view_mut::<3, 3>(3 * i, 3 * i).copy_from(&view.covariance);
+        for (j, (other, theirs)) in views.iter().enumerate().skip(i + 1) {
+            let cross = match (view.row.get(other), theirs.row.get(robot)) {
+                (Some(own), Some(other)) if own.version == other.version => {
+                    own.matrix * other.matrix.transpose()
+                }
+                (None, None) => continue,
+                _ => {
+                    disagreeing += 1;
+                    continue;
+                }
+            };
+            covariance.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&cross);
+            covariance.fixed_view_mut::<3, 3>(3 * j, 3 * i).copy_from(&cross.transpose());
+        }
+    }
+    Some(JointView { form, robots, covariance, disagreeing })
+}
+
+/// The joint estimate of one replica of the exact strategy, each robot carried on to its nominal state in
+/// the invariant error. `None` if a robot has no place in the map, or the filter runs in the additive form.
+pub fn joint_of_replica(joint: &Joint, states: &BTreeMap<RobotId, NominalState>) -> Option<JointView> {
+    let mut covariance = DMatrix::zeros(3 * states.len(), 3 * states.len());
+    let mut robots = Vec::with_capacity(states.len());
+    for (i, (robot, state)) in states.iter().enumerate() {
+        let row = joint.index(*robot)?;
+        for (j, other) in states.keys().enumerate() {
+            let block = joint.covariance().block(row, joint.index(*other)?);
+            covariance.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&block);
+        }
+        let member = joint.member(*robot)?;
+        let grown = state.noise_sum.minus(member.folded_noise).congruence(&member.correction.adjoint());
+        let mut own = covariance.fixed_view_mut::<3, 3>(3 * i, 3 * i);
+        own += grown.to_matrix();
+        robots.push((*robot, member.correction.compose(&state.nominal)));
+    }
+    (joint.form() == ErrorForm::Invariant).then_some(JointView {
+        form: ErrorForm::Invariant,
+        robots,
+        covariance,
+        disagreeing: 0,
+    })
+}
