@@ -11,5 +11,5 @@ pub mod results;
 pub mod strategy;
 
 pub use config::{AgentConfig, ConfigError, NodeConfig};
-pub use strategy::Participant;
 pub use node::{Command, Event, Node, Notice, Record, SampleRefusal, SettledEstimate};
+pub use strategy::Participant;

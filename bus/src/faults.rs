@@ -288,8 +288,10 @@ impl<T: Clone + AsRef<[u8]> + From<Vec<u8>>> VirtualNetwork<T> {
                         T::from(bytes)
                     }
                 };
-                let copies =
-                    [again_after_s.map(|again_s| again_s + later_s), again_later_s.map(|again_s| after_s + again_s)];
+                let copies = [
+                    again_after_s.map(|again_s| again_s + later_s),
+                    again_later_s.map(|again_s| after_s + again_s),
+                ];
                 for again_s in copies.into_iter().flatten() {
                     self.traffic.duplicated.add(bytes);
                     self.put(now.plus_seconds(again_s), Delivery { from, to, payload: payload.clone() });

@@ -85,6 +85,10 @@ pub struct RunArgs {
     /// Coordinates of the filter's error.
     #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
     pub error: ErrorArg,
+    /// A file of [[fault]] tables: what goes wrong between the robots (docs/faults.md); those of the scenario
+    /// itself if absent.
+    #[arg(long, value_name = "FILE")]
+    pub faults: Option<PathBuf>,
     /// Restart an agent that ends by itself.
     #[arg(long)]
     pub restart: bool,
@@ -218,7 +222,11 @@ pub struct FaultsArgs {
     /// A scenario (a TOML file, with [[fault]] tables if it has any) or a recording (a folder).
     pub input: PathBuf,
     /// Which strategies: exact, factored, pairwise, intersection, split_intersection, naive, independent.
-    #[arg(long, value_delimiter = ',', default_value = "exact,factored,pairwise,intersection,split_intersection,naive,independent")]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "exact,factored,pairwise,intersection,split_intersection,naive,independent"
+    )]
     pub strategies: Vec<StrategyKind>,
     /// Shares of messages lost during the fault, percent.
     #[arg(long, value_delimiter = ',', default_value = "0,10,30,50,70,90")]

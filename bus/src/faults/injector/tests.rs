@@ -45,7 +45,8 @@ fn fates(fault: Fault, count: usize) -> Vec<bool> {
 #[test]
 fn bursts_have_the_stated_loss_and_length() {
     // Gilbert 1960: stationary loss p / (p + r), geometric bursts of mean 1 / r.
-    for (loss, mean_length) in [(0.1, 10.0), (0.5, 1.0), (0.5, 10.0), (0.5, 100.0), (0.9, 10.0), (0.9, 100.0)] {
+    for (loss, mean_length) in [(0.1, 10.0), (0.5, 1.0), (0.5, 10.0), (0.5, 100.0), (0.9, 10.0), (0.9, 100.0)]
+    {
         let count = 1_000_000;
         let fates = fates(Fault::Burst { loss, mean_length }, count);
         let lost = fates.iter().filter(|lost| **lost).count() as f64;
@@ -159,7 +160,8 @@ fn a_damaged_message_is_refused_by_the_codec_and_counted_by_the_network() {
     (0..10_000).for_each(|_| network.send(at(0.0), A, B, good.clone()));
     let arrived = network.poll(Timestamp::MAX);
     assert_eq!(arrived.len(), 10_000);
-    let refused = arrived.iter().filter(|delivery| Message::decode(&delivery.payload).is_err()).count() as u64;
+    let refused =
+        arrived.iter().filter(|delivery| Message::decode(&delivery.payload).is_err()).count() as u64;
     assert_eq!(refused, network.traffic().damaged.messages);
     assert!((4750..5250).contains(&refused), "{refused}");
     assert!(arrived.iter().all(|d| (d.payload == good) == Message::decode(&d.payload).is_ok()));

@@ -82,7 +82,8 @@ fn nees<'a>(runs: impl Iterator<Item = &'a [Option<Deviation>]>) -> (Option<Nees
         runs.iter().filter_map(|run| run.iter().cloned().collect::<Option<Vec<_>>>()).collect();
     let missing = all - complete.iter().map(Vec::len).sum::<usize>();
     let summary = NeesSummary::from_runs(&complete, ALPHA);
-    let indefinite = summary.iter().flat_map(|summary| &summary.times).map(|time| time.undefined).sum::<usize>();
+    let indefinite =
+        summary.iter().flat_map(|summary| &summary.times).map(|time| time.undefined).sum::<usize>();
     (summary, missing + indefinite, all)
 }
 
@@ -106,9 +107,10 @@ pub fn row(
     let robots: Vec<Option<NeesSummary>> =
         robots.into_values().map(|runs| nees(runs.into_iter()).0).collect();
     let difference = |(run, exact): (&RunScore, &RunScore)| {
-        let apart = run.last.iter().filter_map(|(robot, pose)| {
-            Some((exact.last.get(robot)?.position() - pose.position()).norm())
-        });
+        let apart = run
+            .last
+            .iter()
+            .filter_map(|(robot, pose)| Some((exact.last.get(robot)?.position() - pose.position()).norm()));
         apart.fold(0.0, f64::max)
     };
     let oracle = if kind == StrategyKind::Exact {
@@ -140,9 +142,16 @@ pub fn row(
         joint_anees_interval: joint.as_ref().and_then(|joint| Some(joint.times.first()?.interval)),
         joint_consistent: joint.as_ref().map(NeesSummary::is_consistent),
         joint_undefined_percent: if all == 0 { 100.0 } else { 100.0 * undefined as f64 / all as f64 },
-        joint_least_eigenvalue_share: runs.iter().filter_map(|run| run.least_definiteness).min_by(f64::total_cmp),
+        joint_least_eigenvalue_share: runs
+            .iter()
+            .filter_map(|run| run.least_definiteness)
+            .min_by(f64::total_cmp),
         robot_anees: robots.iter().map(|robot| robot.as_ref().and_then(|robot| robot.overall)).collect(),
-        robot_anees_interval: robots.iter().flatten().next().and_then(|robot| Some(robot.times.first()?.interval)),
+        robot_anees_interval: robots
+            .iter()
+            .flatten()
+            .next()
+            .and_then(|robot| Some(robot.times.first()?.interval)),
         oracle_difference_healed: oracle,
         replicas_identical: runs.iter().map(|run| run.identical).try_fold(true, |all, one| Some(all && one?)),
         facts_lost: runs.iter().map(|run| run.facts_lost).try_fold(0, |all, one| Some(all + one?)),

@@ -113,12 +113,7 @@ pub struct RunScore {
 }
 
 /// Runs a strategy on a world.
-pub fn play(
-    world: &World,
-    kind: StrategyKind,
-    plan: &FaultPlan,
-    window: Window,
-) -> anyhow::Result<RunScore> {
+pub fn play(world: &World, kind: StrategyKind, plan: &FaultPlan, window: Window) -> anyhow::Result<RunScore> {
     let options = StrategyOptions {
         seed: world.seed,
         plan: plan.clone(),
@@ -166,9 +161,8 @@ fn accuracy(score: &mut RunScore, world: &World, snapshots: &[Snapshot], window:
 fn consistency(score: &mut RunScore, world: &World, snapshots: &[Snapshot], window: Window) {
     let times = JUDGED.map(|share| window.start_s + share * (window.end_s - window.start_s));
     for time_s in times {
-        let nearest = |a: &&Snapshot, b: &&Snapshot| {
-            (a.t_s - time_s).abs().total_cmp(&(b.t_s - time_s).abs())
-        };
+        let nearest =
+            |a: &&Snapshot, b: &&Snapshot| (a.t_s - time_s).abs().total_cmp(&(b.t_s - time_s).abs());
         let Some(snapshot) = snapshots.iter().min_by(nearest) else { return };
         let truths: BTreeMap<RobotId, Pose2> = snapshot
             .views

@@ -19,8 +19,21 @@ pub fn text(json: &FaultsJson) -> String {
     let _ = writeln!(
         text,
         "{:<18} {:>5} {:>5}  {:>15} {:>8} {:>15} {:>8}  {:>6} {:>13} {:>6}  {:>9} {:>6} {:>6} {:>7} {:>9}",
-        "strategy", "loss%", "burst", "RMSE during m", "at end", "healed", "lossless", "joint", "interval",
-        "robot", "oracle", "lost", "twice", "pending", "kB"
+        "strategy",
+        "loss%",
+        "burst",
+        "RMSE during m",
+        "at end",
+        "healed",
+        "lossless",
+        "joint",
+        "interval",
+        "robot",
+        "oracle",
+        "lost",
+        "twice",
+        "pending",
+        "kB"
     );
     for row in &json.rows {
         let with_error = |value: Option<f64>, error: Option<f64>| match (value, error) {
