@@ -7,6 +7,7 @@ mod sections;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use pleiad_bus::{FaultPlan, FaultsError};
 use pleiad_estimation::fact::{ClockMap, Noise};
 use pleiad_estimation::fold::FoldConfig;
 use pleiad_estimation::motion::MotionModel;
@@ -18,9 +19,9 @@ use serde::{Deserialize, Serialize};
 use checks::{finite, not_negative, positive, value};
 pub use model::RobotCorrection;
 pub use sections::{
-    AngleNoise, BusMode, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LengthNoise,
-    MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection, Strategy,
-    VelocityName, YawName,
+    AngleNoise, BusMode, BusSection, ClockSection, ErrorName, FaultsSection, FilterSection, LandmarkRow,
+    LengthNoise, MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection,
+    Strategy, VelocityName, YawName,
 };
 
 /// Why a configuration cannot be used.
@@ -51,6 +52,9 @@ pub enum ConfigError {
         /// What is wrong in it.
         cause: Box<ConfigError>,
     },
+    /// The faults cannot be read.
+    #[error("faults: {0}")]
+    Faults(Box<FaultsError>),
     /// The model of the robot cannot be read.
     #[error("model: {0}")]
     Model(Box<RecordingError>),
@@ -112,6 +116,9 @@ pub struct AgentConfig {
     /// What is kept on disk.
     #[serde(default)]
     pub output: OutputSection,
+    /// What is to go wrong between the robots, for trials.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub faults: Option<FaultsSection>,
 }
 
 /// A robot's prior.
@@ -169,10 +176,22 @@ impl AgentConfig {
         if let (Some(model), Some(folder)) = (&mut config.model, path.parent()) {
             *model = folder.join(&*model);
         }
-        match config.node() {
+        if let (Some(faults), Some(folder)) = (&mut config.faults, path.parent()) {
+            faults.plan = folder.join(&faults.plan);
+        }
+        match config.node().and_then(|_| config.fault_plan()) {
             Ok(_) => Ok(config),
             Err(cause) => Err(ConfigError::In { path: path.to_owned(), cause: Box::new(cause) }),
         }
+    }
+
+    /// Reads the plan of faults, if there is one.
+    ///
+    /// # Errors
+    /// [`ConfigError::Faults`].
+    pub fn fault_plan(&self) -> Result<Option<FaultPlan>, ConfigError> {
+        let plan = self.faults.as_ref().map(|faults| FaultPlan::load(&faults.plan)).transpose();
+        plan.map_err(|error| ConfigError::Faults(Box::new(error)))
     }
 
     /// The team's name.

@@ -7,12 +7,14 @@
 mod channel;
 mod expression;
 pub mod faults;
+mod faulty;
 mod memory;
 mod traits;
 mod zenoh_bus;
 mod zenoh_config;
 
 pub use faults::{FaultPlan, FaultsError, Injector, LinkFaults, VirtualNetwork};
+pub use faulty::FaultyBus;
 pub use memory::{MemoryBus, MemoryNetwork, MemoryToken};
 pub use traits::{Bus, BusError, Incoming, Liveliness, Query};
 pub use zenoh_bus::{ZenohBus, ZenohToken};

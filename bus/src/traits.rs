@@ -3,6 +3,7 @@
 use std::future::Future;
 use std::time::Duration;
 
+use pleiad_protocol::Timestamp;
 use tokio::sync::{mpsc, oneshot};
 
 /// A payload published on a key.
@@ -116,6 +117,9 @@ pub trait Bus: Send + Sync + 'static {
 
     /// How much has been dropped so far because a receiver of this bus did not take it in time.
     fn dropped(&self) -> u64;
+
+    /// Tells the time that the robot has reached, for a layer that acts by it.
+    fn team_time(&self, _now: Timestamp) {}
 }
 
 /// A shared bus is a bus.
@@ -166,5 +170,9 @@ impl<B: Bus> Bus for std::sync::Arc<B> {
 
     fn close(&self) -> impl Future<Output = ()> + Send {
         (**self).close()
+    }
+
+    fn team_time(&self, now: Timestamp) {
+        (**self).team_time(now);
     }
 }

@@ -85,6 +85,10 @@ pub struct RunArgs {
     /// Coordinates of the filter's error.
     #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
     pub error: ErrorArg,
+    /// A file of [[fault]] tables: what goes wrong between the robots (docs/faults.md); those of the scenario
+    /// itself if absent.
+    #[arg(long, value_name = "FILE")]
+    pub faults: Option<PathBuf>,
     /// Restart an agent that ends by itself.
     #[arg(long)]
     pub restart: bool,

@@ -115,6 +115,7 @@ fn configuration(
         landmarks: landmarks.to_vec(),
         bus: BusSection::default(),
         output: OutputSection::default(),
+        faults: None,
     }
 }
 

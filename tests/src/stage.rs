@@ -133,6 +133,7 @@ impl Stage {
             landmarks: Vec::new(),
             bus,
             output: OutputSection { directory: Some(self.folder_of(robot)), ..OutputSection::default() },
+            faults: None,
         }
     }
 

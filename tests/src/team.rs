@@ -111,6 +111,7 @@ impl Team {
                 landmarks: landmarks.clone(),
                 bus: BusSection::default(),
                 output: OutputSection { estimate_rate_hz: told.estimate_rate_hz, ..OutputSection::default() },
+                faults: None,
             };
             (*robot, config.node().expect("a valid configuration"))
         });

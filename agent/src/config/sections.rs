@@ -276,6 +276,17 @@ impl Default for BusSection {
     }
 }
 
+/// `[faults]`: what is to go wrong between the robots, for trials.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FaultsSection {
+    /// A file with `[[fault]]` tables, a scenario for instance. Relative to the file it is read from.
+    pub plan: PathBuf,
+    /// Seed of the links' luck; the same for all robots.
+    #[serde(default)]
+    pub seed: u64,
+}
+
 /// How an agent takes part in the network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -55,7 +55,10 @@ impl<B: Bus + Clone> Agent<'_, B> {
 
     pub(super) async fn single_sample(&mut self, incoming: Incoming) -> Result<(), DriverError> {
         match pleiad_protocol::decode_sample(&incoming.payload) {
-            Ok(sample) => self.act(Event::Sample(sample)).await,
+            Ok(sample) => {
+                self.bus.team_time(sample.time);
+                self.act(Event::Sample(sample)).await
+            }
             Err(error) => {
                 tracing::warn!(key = incoming.key, %error, "sample refused");
                 Ok(())
@@ -90,6 +93,9 @@ impl<B: Bus + Clone> Agent<'_, B> {
     async fn take_batch(&mut self, batch: SensorBatch) -> Result<SensorAck, DriverError> {
         let mut ack = SensorAck { number: batch.number, ..SensorAck::default() };
         let (mut records, mut entries, mut rest) = (Vec::new(), Vec::new(), Vec::new());
+        if let Some(last) = batch.samples.last() {
+            self.bus.team_time(last.time);
+        }
         for sample in batch.samples {
             // A sample that is taken is always journalled; one that is not never is.
             let mut taken = false;

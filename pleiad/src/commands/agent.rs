@@ -5,7 +5,8 @@ use std::sync::Arc;
 use anyhow::Context;
 use pleiad_agent::AgentConfig;
 use pleiad_agent::config::BusMode;
-use pleiad_bus::{Bus, ZenohBus, ZenohConfig, ZenohMode};
+use pleiad_bus::{Bus, FaultyBus, ZenohBus, ZenohConfig, ZenohMode};
+use pleiad_estimation::RobotId;
 
 use crate::cli::AgentArgs;
 
@@ -16,7 +17,14 @@ pub fn run(args: &AgentArgs) -> anyhow::Result<()> {
         let bus = Arc::new(ZenohBus::open(&zenoh_config(&config)).await?);
         // Every start of the process is told apart from every other by a number nobody can guess.
         let nonce = getrandom::u64().context("the system gives no random number")?;
-        let outcome = pleiad_agent::driver::run(&config, &bus, nonce, stopped()).await;
+        let outcome = match (config.fault_plan()?, &config.faults) {
+            (Some(plan), Some(faults)) => {
+                tracing::warn!(plan = %faults.plan.display(), "messages of peers are lost and delayed on purpose");
+                let faulty = FaultyBus::new(bus.clone(), RobotId(config.robot), plan, faults.seed, None);
+                pleiad_agent::driver::run(&config, &faulty, nonce, stopped()).await
+            }
+            _ => pleiad_agent::driver::run(&config, &bus, nonce, stopped()).await,
+        };
         bus.close().await;
         Ok(outcome?)
     })

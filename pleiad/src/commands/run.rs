@@ -1,6 +1,8 @@
 //! `pleiad run`: a scenario with one agent process per robot, fed by a process that simulates the robots.
 
 use anyhow::bail;
+use pleiad_agent::config::FaultsSection;
+use pleiad_bus::FaultPlan;
 use pleiad_sim_peers::{Scenario, simulate};
 
 use super::replay::{command_line, text, write_run};
@@ -17,7 +19,17 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     let seed = args.seed.unwrap_or(scenario.seed);
     let world = simulate(&scenario, seed)?;
     let filter = FilterArgs { strategy: args.strategy, error: args.error };
-    let team = setup::simulated(&scenario, world, filter);
+    let mut team = setup::simulated(&scenario, world, filter);
+    let plan = args.faults.as_ref().or_else(|| (!scenario.faults.rules.is_empty()).then_some(&args.scenario));
+    if let Some(plan) = plan {
+        let rules = FaultPlan::load(plan)?.rules;
+        if rules.is_empty() {
+            bail!("--faults {}: found no [[fault]] table; docs/faults.md lists their keys", plan.display());
+        }
+        for agent in team.agents.values_mut() {
+            agent.faults = Some(FaultsSection { plan: plan.clone(), seed });
+        }
+    }
     let out = folder::create(args.out.as_deref(), &scenario.name)?;
     std::fs::copy(&args.scenario, out.join("scenario.toml"))?;
     let options = ProcessOptions {

@@ -25,6 +25,8 @@ use crate::evaluation::{RobotResult, RunResult};
 use crate::setup::{self, Team};
 use crate::{folder, output};
 
+/// The plan of faults beside a run.
+const FAULTS: &str = "faults.toml";
 /// Digest rounds granted after the last sample; without faults one is enough.
 const SETTLING_ROUNDS: u32 = 50;
 /// Limits for a machine that is very busy; a run that goes well never comes near them.
@@ -104,9 +106,16 @@ pub fn as_processes(team: &Team, out: &Path, options: &ProcessOptions) -> anyhow
     if let Some(model) = team.agents.values().find_map(|agent| agent.model.as_ref()) {
         setup::copy_model(model, &out.join(setup::MODEL))?;
     }
+    if let Some(faults) = team.agents.values().find_map(|agent| agent.faults.as_ref()) {
+        let to = out.join(FAULTS);
+        std::fs::copy(&faults.plan, &to).with_context(|| format!("cannot write {}", to.display()))?;
+    }
     let mut entries = Vec::new();
     for (robot, agent) in &team.agents {
         let mut agent = agent.clone();
+        if let Some(faults) = &mut agent.faults {
+            faults.plan = Path::new("../..").join(FAULTS);
+        }
         agent.model = agent.model.map(|_| Path::new("../..").join(setup::MODEL));
         let endpoint = endpoints.get(robot).context("an endpoint for every robot")?;
         agent.team.clone_from(&name);
