@@ -63,6 +63,12 @@ impl FactKey {
         Self { time, rank: 1, id }
     }
 
+    /// Key of an observation counted a second time, which only a planted mistake does.
+    #[cfg(feature = "planted")]
+    pub(crate) fn again(time: Timestamp, id: EntryId) -> Self {
+        Self { time, rank: 2, id }
+    }
+
     /// The last key that a fact of `time` or earlier can have.
     pub fn last_at(time: Timestamp) -> Self {
         let id =

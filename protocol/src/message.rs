@@ -1,14 +1,18 @@
 //! All messages, and the way from bytes and to bytes.
 
 use pleiad_estimation::fact::Entry;
+use pleiad_estimation::ledger::Checkpoint;
 use pleiad_estimation::sample::Sample;
 
 use crate::codec::{self, Reader};
 use crate::error::ProtocolError;
 use crate::limits;
-use crate::messages::{ControlReply, ControlRequest, Estimate, FactsRequest, SensorAck, SensorBatch, Status};
+use crate::messages::{
+    ControlReply, ControlRequest, Estimate, FactsRequest, SensorAck, SensorBatch, SnapshotPart, SnapshotRequest,
+    Status,
+};
 use crate::wire::{WireEntry, WireEstimate, WireSample};
-use crate::wire::{control, status, transfer};
+use crate::wire::{control, snapshot, status, transfer};
 
 /// Anything that travels.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +35,10 @@ pub enum Message {
     ControlRequest(ControlRequest),
     /// Its answer.
     ControlReply(ControlReply),
+    /// Asks for a snapshot.
+    SnapshotRequest(SnapshotRequest),
+    /// A part of one.
+    SnapshotPart(SnapshotPart),
 }
 
 /// The second byte of a message. Numbers are never reused.
@@ -44,6 +52,8 @@ mod kind {
     pub const SENSOR_ACK: u8 = 7;
     pub const CONTROL_REQUEST: u8 = 8;
     pub const CONTROL_REPLY: u8 = 9;
+    pub const SNAPSHOT_REQUEST: u8 = 20;
+    pub const SNAPSHOT_PART: u8 = 21;
 }
 
 impl Message {
@@ -88,6 +98,16 @@ impl Message {
                 control::put_reply(&mut bytes, reply);
                 bytes
             }
+            Self::SnapshotRequest(request) => {
+                let mut bytes = begin(kind::SNAPSHOT_REQUEST);
+                snapshot::put_request(&mut bytes, *request);
+                bytes
+            }
+            Self::SnapshotPart(part) => {
+                let mut bytes = begin(kind::SNAPSHOT_PART);
+                snapshot::put_part(&mut bytes, part);
+                bytes
+            }
         }
     }
 
@@ -116,6 +136,8 @@ impl Message {
             kind::SENSOR_ACK => Self::SensorAck(transfer::take_ack(&mut reader)?),
             kind::CONTROL_REQUEST => Self::ControlRequest(control::take_request(&mut reader)?),
             kind::CONTROL_REPLY => Self::ControlReply(control::take_reply(&mut reader)?),
+            kind::SNAPSHOT_REQUEST => Self::SnapshotRequest(snapshot::take_request(&mut reader)?),
+            kind::SNAPSHOT_PART => Self::SnapshotPart(snapshot::take_part(&mut reader)?),
             found => return Err(ProtocolError::Kind { found }),
         };
         reader.end()?;
@@ -134,6 +156,8 @@ impl Message {
             Self::SensorAck(_) => "sensor ack",
             Self::ControlRequest(_) => "control request",
             Self::ControlReply(_) => "control reply",
+            Self::SnapshotRequest(_) => "snapshot request",
+            Self::SnapshotPart(_) => "snapshot part",
         }
     }
 }
@@ -172,6 +196,19 @@ pub fn decode_sample(bytes: &[u8]) -> Result<Sample, ProtocolError> {
         Message::Sample(sample) => Ok(sample),
         other => Err(ProtocolError::OtherKind { found: other.kind(), expected: "sample" }),
     }
+}
+
+/// A snapshot in bytes, to be sent in parts or kept.
+pub fn encode_checkpoint(checkpoint: &Checkpoint) -> Vec<u8> {
+    snapshot::encode(checkpoint)
+}
+
+/// The snapshot in `bytes`, checked.
+///
+/// # Errors
+/// Whatever is wrong with it first, named.
+pub fn decode_checkpoint(bytes: &[u8]) -> Result<Checkpoint, ProtocolError> {
+    snapshot::decode(bytes)
 }
 
 fn begin(kind: u8) -> Vec<u8> {
