@@ -59,6 +59,7 @@ fn status(config: &Config, finished: bool) -> Status {
         samples: SampleCounts::default(),
         input_ended: finished,
         drained: finished,
+        closure: None,
     }
 }
 

@@ -223,7 +223,7 @@ impl Ledger {
 
     /// Whether an entry lies where nothing is accepted: a log that has ended, or a robot that is not of the
     /// team.
-    fn outside(&self, id: EntryId) -> Option<Refusal> {
+    pub fn outside(&self, id: EntryId) -> Option<Refusal> {
         let closing = self.closing.as_ref()?;
         if closing.base.floors.get(&id.robot).is_some_and(|floor| id.boot < *floor) {
             return Some(Refusal::Expired);
@@ -465,7 +465,9 @@ impl Ledger {
     pub fn unanswered(&self, robot: RobotId) -> impl Iterator<Item = (EntryId, Timestamp)> + '_ {
         self.pending
             .iter()
-            .filter(move |(_, observation)| Self::names(observation, robot))
+            .filter(move |(_, observation)| {
+                Self::names(observation, robot) && self.takes_part(robot, observation.time)
+            })
             .map(|(id, observation)| (*id, observation.time))
     }
 
@@ -478,6 +480,11 @@ impl Ledger {
             }
         }
         counts
+    }
+
+    /// Observations that wait for the half of `robot`.
+    pub fn pending_of(&self, robot: RobotId) -> usize {
+        if self.pending.is_empty() { 0 } else { self.unanswered(robot).count() }
     }
 
     /// Robots that published two different entries under one identity.

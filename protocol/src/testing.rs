@@ -146,8 +146,12 @@ fn answer(rng: &mut impl Rng) -> Answer {
 }
 
 fn seal(rng: &mut impl Rng) -> Seal {
-    let log = |rng: &mut _| SealedLog { boot: BootIndex(small(rng)), length: integer(rng), last: rng.random() };
-    Seal { observed: time(rng), answered: time(rng), closed: time(rng), logs: several(rng, log) }
+    let logs = several(rng, |rng| SealedLog {
+        boot: BootIndex(small(rng)),
+        length: integer(rng),
+        last: rng.random(),
+    });
+    Seal { observed: time(rng), answered: time(rng), closed: time(rng), logs }
 }
 
 fn vote(rng: &mut impl Rng) -> Vote {

@@ -132,6 +132,10 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 let entries = self.node.serve(&request, limits::ENTRIES);
                 self.publisher.reply(query, &Message::Entries(entries));
             }
+            Ok(Message::SnapshotRequest(request)) => match self.node.serve_snapshot(&request) {
+                Some(part) => self.publisher.reply(query, &Message::SnapshotPart(part)),
+                None => tracing::debug!("asked for a snapshot, but nothing is closed here"),
+            },
             Ok(other) => tracing::warn!(kind = other.kind(), "not a request for facts"),
             Err(error) => tracing::warn!(%error, "request for facts refused"),
         }
@@ -151,6 +155,10 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 (ControlReply::Accepted, false)
             }
             ControlRequest::Shutdown => (ControlReply::Accepted, true),
+            ControlRequest::Evict(robot) => {
+                self.act(Event::Evict(robot)).await?;
+                (ControlReply::Accepted, false)
+            }
         };
         if end {
             // Who asked may look for the results as soon as it has its answer.

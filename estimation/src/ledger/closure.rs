@@ -119,6 +119,39 @@ impl Ledger {
         self.closing.as_ref().map(|closing| &closing.base).filter(|base| base.time > Timestamp::MIN)
     }
 
+    /// What this ledger rests on, the empty one before the first cut.
+    pub fn base(&self) -> Option<&Checkpoint> {
+        self.closing.as_ref().map(|closing| &closing.base)
+    }
+
+    /// Rests on a peer's snapshot from now on; what is held beyond it is kept.
+    pub fn take_over(&mut self, checkpoint: Checkpoint) {
+        let Some(closing) = &self.closing else { return };
+        let (closure, owner) = (closing.closure.clone(), closing.owner);
+        let mut fresh = Self::from_checkpoint(self.config, closure, owner, checkpoint);
+        for entry in self.logs.values().flat_map(Log::all) {
+            fresh.insert(entry.clone());
+        }
+        fresh.quarantined = std::mem::take(&mut self.quarantined);
+        #[cfg(feature = "planted")]
+        {
+            fresh.planted = self.planted;
+        }
+        *self = fresh;
+    }
+
+    /// Whether a log is over and forgotten.
+    pub fn is_forgotten(&self, log: LogId) -> bool {
+        let floor = self.closing.as_ref().and_then(|closing| closing.base.floors.get(&log.robot));
+        floor.is_some_and(|floor| log.boot < *floor)
+    }
+
+    /// The logs of a robot that have not ended, and their lengths.
+    pub fn open_logs(&self, robot: RobotId) -> impl Iterator<Item = (LogId, u64)> + '_ {
+        let logs = self.logs.iter().filter(move |(id, log)| id.robot == robot && log.limit.is_none());
+        logs.map(|(id, log)| (*id, log.held()))
+    }
+
     /// The membership as far as it is known here.
     pub fn views(&self) -> Option<&Views> {
         self.closing.as_ref().map(|closing| &closing.views)
@@ -175,7 +208,18 @@ impl Ledger {
     /// Up to when the owner may say that it has answered everything that names it.
     pub fn answerable(&self) -> Timestamp {
         let Some(closing) = &self.closing else { return Timestamp::MIN };
-        let members = closing.views.active().map(|term| self.standing(closing, term));
+        let members: Vec<Standing> =
+            closing.views.active().map(|term| self.standing(closing, term)).collect();
+        // Looking through what is owed is worth it only if something would follow.
+        let sealed = closing.closure.floor(rules::answerable(members.iter().copied(), None));
+        let answered = self.seal_of(closing.owner).map_or(Timestamp::MIN, |seal| seal.answered);
+        if sealed <= answered {
+            return answered;
+        }
+        #[cfg(feature = "planted")]
+        if self.planted == Some(super::Planted::AnswerBlindly) {
+            return sealed;
+        }
         let owed = self.unanswered(closing.owner).map(|(_, time)| time).min();
         closing.closure.floor(rules::answerable(members, owed))
     }
