@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use pleiad_agent::config::{
-    AgentConfig, AngleNoise, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LengthNoise,
+    AgentConfig, AngleNoise, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LedgerSection, LengthNoise,
     MotionSection, OutputSection, PriorSection, RangeBearingNoise, RobotCorrection, SensorsSection, Strategy,
 };
 use pleiad_estimation::sample::{Reading, Sample};
@@ -114,6 +114,7 @@ fn configuration(
         clock: ClockSection::default(),
         landmarks: landmarks.to_vec(),
         bus: BusSection::default(),
+        ledger: LedgerSection::default(),
         output: OutputSection::default(),
     }
 }

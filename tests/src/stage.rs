@@ -132,6 +132,7 @@ impl Stage {
             clock: ClockSection::default(),
             landmarks: Vec::new(),
             bus,
+            ledger: LedgerSection::default(),
             output: OutputSection { directory: Some(self.folder_of(robot)), ..OutputSection::default() },
         }
     }
@@ -323,7 +324,7 @@ impl Stage {
         let records = Journal::read(&self.folder_of(robot).join(driver::JOURNAL)).unwrap();
         let entry = |record| match record {
             Record::Entry(entry) => Some(entry),
-            Record::Sample(_) => None,
+            _ => None,
         };
         records.into_iter().filter_map(entry).collect()
     }

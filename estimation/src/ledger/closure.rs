@@ -195,9 +195,9 @@ impl Ledger {
             Standing { observed: Timestamp::MIN, answered: Timestamp::MIN, from: term.from };
         let base = closing.base.seals.get(&term.robot).map(|(id, seal)| (id, seal));
         let later = closing.seals.get(&term.robot).into_iter().flatten();
-        let counting = base.into_iter().chain(later).filter(|(id, seal)| {
-            id.boot >= term.boot && self.counts_here(closing, **id, seal)
-        });
+        // A log is said to have ended once, so that a later seal rests on what earlier ones speak of.
+        let of_term = base.into_iter().chain(later).filter(|(id, _)| id.boot >= term.boot);
+        let counting = of_term.take_while(|(id, seal)| self.counts_here(closing, **id, seal));
         if let Some((_, seal)) = counting.last() {
             standing.observed = seal.observed;
             standing.answered = seal.answered;
@@ -452,6 +452,10 @@ impl Ledger {
                     raise(*id, *held);
                     limits.insert(*id, *held);
                 }
+                continue;
+            }
+            let accounted = base.seals.get(&term.robot).filter(|(id, _)| id.boot >= term.boot);
+            if accounted.is_some_and(|(_, seal)| seal.observed.min(seal.answered) >= cut) {
                 continue;
             }
             let seals = closing.seals.get(&term.robot).into_iter().flatten();

@@ -43,13 +43,10 @@ pub struct Checks {
     closed: BTreeMap<Timestamp, Vec<(RobotId, u32, Fingerprint)>>,
     /// How often a robot has been evicted.
     lives: BTreeMap<RobotId, u32>,
-    /// Ends of logs that snapshots have stated, by robot.
-    ends: BTreeMap<RobotId, BTreeMap<LogId, u64>>,
     /// Robots that may have lost facts they had said.
     pub damaged: BTreeSet<RobotId>,
     pub most_kept: usize,
     pub cuts: u64,
-    pub taken_over: u64,
 }
 
 impl Checks {
@@ -69,21 +66,15 @@ impl Checks {
 
     pub fn closes(&mut self, robot: RobotId, node: &Node, cut: Timestamp, hash: Fingerprint) {
         let life = self.lives.get(&robot).copied().unwrap_or(0);
+        if std::env::var("DBG").is_ok() {
+            std::fs::write(format!("/tmp/wt/dbg/{}-{}-{}", cut.0 / 1_000_000_000, robot, hash), format!("{:#?}", node.ledger().checkpoint())).ok();
+        }
         self.closed.entry(cut).or_default().push((robot, life, hash));
         self.cuts += 1;
-        self.note_ends(robot, node);
-    }
-
-    pub fn note_ends(&mut self, robot: RobotId, node: &Node) {
-        if let Some(checkpoint) = node.ledger().checkpoint() {
-            let ends = self.ends.entry(robot).or_default();
-            ends.extend(checkpoint.logs.iter().filter_map(|(id, base)| Some((*id, base.limit?))));
-        }
     }
 
     pub fn evicted(&mut self, robot: RobotId) {
         *self.lives.entry(robot).or_insert(0) += 1;
-        self.ends.remove(&robot);
         self.damaged.insert(robot);
     }
 
@@ -141,7 +132,21 @@ impl Checks {
     fn accepted(&self, node: &Node) -> Vec<Entry> {
         let held: BTreeMap<LogId, u64> =
             node.ledger().digests().map(|digest| (digest.log, digest.held)).collect();
-        let ended = |log: &LogId| self.ends.values().find_map(|ends| ends.get(log)).copied();
+        // Logs that a snapshot has forgotten ended where their author said, or where he was evicted.
+        let mut ends: BTreeMap<LogId, u64> = BTreeMap::new();
+        for (_, entry) in self.said.values() {
+            match &entry.body {
+                Body::Seal(seal) => {
+                    for log in seal.logs.iter().filter(|log| log.last) {
+                        let id = LogId { robot: entry.id.robot, boot: log.boot };
+                        ends.entry(id).or_insert(log.length);
+                    }
+                }
+                Body::Vote(vote) => ends.extend(vote.held.iter().copied()),
+                _ => {}
+            }
+        }
+        let ended = |log: &LogId| ends.get(log).copied();
         let inside = |id: &EntryId| {
             let end = held.get(&id.log()).copied().or_else(|| ended(&id.log()));
             end.is_some_and(|end| id.sequence.0 < end)

@@ -356,15 +356,17 @@ impl Run<'_> {
     fn execute(&mut self, id: RobotId, command: Command) -> Result<bool, Violation> {
         match command {
             Command::Journal(records) => {
-                for record in &records {
-                    if let pleiad_agent::Record::Entry(entry) = record
-                        && entry.id.robot == id
-                    {
-                        self.checks.says(entry)?;
-                    }
-                }
                 let sync = journal::must_sync(&records, id);
                 let Some(robot) = self.robots.get_mut(&id) else { return Ok(false) };
+                if !robot.disk.full {
+                    for record in &records {
+                        if let pleiad_agent::Record::Entry(entry) = record
+                            && entry.id.robot == id
+                        {
+                            self.checks.says(entry)?;
+                        }
+                    }
+                }
                 if !robot.disk.append(records) {
                     self.die(id, 1.0);
                     return Ok(false);
@@ -410,9 +412,6 @@ impl Run<'_> {
             }
             Notice::SnapshotTaken { .. } => {
                 self.outcome.taken_over += 1;
-                if let Some(node) = self.robots.get(&id).and_then(|robot| robot.node.as_ref()) {
-                    self.checks.note_ends(id, node);
-                }
             }
             Notice::Equivocation { .. }
             | Notice::Fork { .. }
