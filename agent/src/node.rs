@@ -225,6 +225,8 @@ impl Node {
             }
         }
         if added {
+            // Whoever has just learned that he was evicted says nothing any more.
+            self.check_membership();
             self.answer();
         }
     }

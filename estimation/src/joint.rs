@@ -218,14 +218,18 @@ impl Joint {
         member.correction = member.correction.compose(&s.inverse());
         member.folded_noise = unfolded.congruence(&s.adjoint()).scaled(-1.0);
         member.boot = index;
-        let gap_adjoint = boot.nominal.adjoint();
-        let state = NominalState {
-            nominal: boot.nominal,
-            // The gap is motion noise like any other, in the frame of the nominal trajectory.
-            noise_sum: continuation.gap.congruence(&gap_adjoint),
-        };
-        self.propagate(row, &state);
-        self.members[row].folded_noise = Symmetric3::zero();
+        if self.form == ErrorForm::Additive {
+            // Its coordinates do not stay put, so that what is carried is folded here, with the gap.
+            let gap = continuation.gap.congruence(&boot.nominal.adjoint());
+            self.propagate(row, &NominalState { nominal: boot.nominal, noise_sum: gap });
+            self.members[row].folded_noise = Symmetric3::zero();
+        } else {
+            // The gap is motion in the body frame at the pose after it. What is carried is folded with the
+            // next event, as it would have been without the boot.
+            let pose = member.correction.compose(&boot.nominal);
+            member.nominal = boot.nominal;
+            self.covariance.add_diagonal(row, continuation.gap.congruence(&pose.adjoint()));
+        }
     }
 
     /// Folds the process noise a robot has accumulated since its last event.

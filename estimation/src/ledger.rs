@@ -165,7 +165,8 @@ impl Ledger {
     pub fn insert(&mut self, entry: Entry) -> Insertion {
         let id = entry.id;
         if let Some(refusal) = self.outside(id) {
-            if matches!(entry.body, Body::Observation(_)) {
+            // What is over and forgotten comes again and again; it was accounted for.
+            if matches!(entry.body, Body::Observation(_)) && !self.is_forgotten(id.log()) {
                 self.expired += 1;
             }
             return Insertion::Refused(refusal);

@@ -52,7 +52,7 @@ impl Node {
     }
 
     /// A robot that is not of the team asks to be.
-    fn check_membership(&mut self) {
+    pub(super) fn check_membership(&mut self) {
         let robot = self.config.robot;
         let Some(views) = self.ledger.views() else { return };
         if views.is_active(robot) || self.membership.joining.is_some() {

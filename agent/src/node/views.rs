@@ -88,7 +88,9 @@ impl Node {
     /// What this node holds and does: its digest for peers, its state for operators.
     pub fn status(&mut self) -> Status {
         let estimate = self.ledger.fingerprint();
-        let logs = self.ledger.digests().filter(|digest| digest.held > 0);
+        // Also logs of which only later entries have come: their author may have lost his journal, and must
+        // not begin them again.
+        let logs = self.ledger.digests().filter(|digest| digest.held > 0 || digest.waiting > 0);
         let logs: Vec<_> = logs
             .map(|digest| LogStatus { log: digest.log, held: digest.held, chain: digest.chain })
             .collect();

@@ -39,6 +39,8 @@ pub struct LogDigest {
     pub chain: Fingerprint,
     /// The first of them that is still kept.
     pub first: u64,
+    /// Entries that wait for a missing one.
+    pub waiting: usize,
 }
 
 impl Log {
@@ -90,7 +92,7 @@ impl Log {
     }
 
     pub(super) fn digest(&self, log: LogId) -> LogDigest {
-        LogDigest { log, held: self.held(), chain: self.chain, first: self.first }
+        LogDigest { log, held: self.held(), chain: self.chain, first: self.first, waiting: self.waiting.len() }
     }
 
     /// Chain over the entries before `sequence`.

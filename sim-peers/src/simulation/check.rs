@@ -57,11 +57,18 @@ impl Checks {
     /// An entry went to the disk of its author or to the others: its identity has one content for ever.
     pub fn says(&mut self, entry: &Entry) -> Result<(), Violation> {
         let print = Fingerprint::of(entry);
-        let (known, _) = self.said.entry(entry.id).or_insert_with(|| (print, entry.clone()));
+        let (known, first) = self.said.entry(entry.id).or_insert_with(|| (print, entry.clone()));
         if *known != print {
-            return Err(self.violation(Some(entry.id.robot), format!("{} has two contents", entry.id)));
+            let what = format!("{} has two contents: {:?} and {:?}", entry.id, first.body, entry.body);
+            return Err(self.violation(Some(entry.id.robot), what));
         }
         Ok(())
+    }
+
+    /// A robot has lost its disk: logs of its that reached nobody may begin again.
+    pub fn unsaid(&mut self, robot: RobotId, heard: &BTreeSet<LogId>) {
+        let last = heard.iter().map(|log| log.boot).max();
+        self.said.retain(|id, _| id.robot != robot || last.is_some_and(|last| id.boot <= last));
     }
 
     pub fn closes(&mut self, robot: RobotId, node: &Node, cut: Timestamp, hash: Fingerprint) {

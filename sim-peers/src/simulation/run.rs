@@ -1,8 +1,9 @@
 //! One schedule from beginning to end.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_agent::{Command, Event, Node, NodeConfig, Notice, journal};
+use pleiad_estimation::fact::LogId;
 use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_protocol::{Message, limits};
 
@@ -278,6 +279,11 @@ impl Run<'_> {
         }
         robot.node = Some(node);
         if lost {
+            // What reached nobody was never said.
+            let others = self.robots.iter().filter(|(other, _)| **other != id);
+            let heard = others.filter_map(|(_, robot)| robot.node.as_ref()).flat_map(|node| node.ledger().digests());
+            let heard: BTreeSet<LogId> = heard.map(|digest| digest.log).filter(|log| log.robot == id).collect();
+            self.checks.unsaid(id, &heard);
             let others: Vec<RobotId> = self.robots.keys().copied().filter(|other| *other != id).collect();
             for other in others {
                 let status = self.robots.get_mut(&other).and_then(|robot| Some(robot.node.as_mut()?.status()));
