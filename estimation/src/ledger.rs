@@ -288,7 +288,7 @@ impl Ledger {
         };
         // Nobody is quarantined while what is held already is filed again. What a cut has accounted for is
         // kept for peers that have not come as far.
-        for (id, log) in &self.logs {
+        for (id, log) in self.logs.iter().filter(|(_, log)| log.limit != Some(0)) {
             rebuilt.logs.insert(*id, log.before_base());
         }
         for log in self.logs.values() {

@@ -153,7 +153,7 @@ impl Node {
             return false;
         }
         let logs = self.older_logs(boot, until);
-        if !self.knows_its_past(&logs) {
+        if !self.knows_its_past() {
             return false;
         }
         if logs.iter().any(|log| log.last && self.rebased == Some(log.boot)) {
@@ -164,12 +164,14 @@ impl Node {
         true
     }
 
-    /// Whether older logs may be said to have ended: everyone was asked since this process began whether it
-    /// holds more of them. A journal may have lost its end with the power.
-    fn knows_its_past(&self, logs: &[SealedLog]) -> bool {
+    /// Whether this robot may say how long its older logs are: before the first seal of this process everyone
+    /// is asked whether it holds more of them. A journal may have lost its end with the power.
+    fn knows_its_past(&self) -> bool {
         let Some(views) = self.ledger.views() else { return true };
+        let first = self.lived_boots.first().copied().unwrap_or_default();
         let mut others = views.active().filter(|term| term.robot != self.config.robot);
-        !logs.iter().any(|log| log.last && !self.lived_boots.contains(&log.boot))
+        first == BootIndex(0)
+            || self.ledger.sealed_in(self.config.robot).is_some_and(|boot| boot >= first)
             || others.all(|term| self.membership.caught_up.contains(&term.robot))
     }
 
@@ -311,11 +313,25 @@ impl Node {
         let held: BTreeMap<LogId, u64> = self.ledger.digests().map(|digest| (digest.log, digest.held)).collect();
         let missing = theirs.firsts.iter().any(|(log, first)| {
             held.get(log).copied().unwrap_or(0) < *first && !self.ledger.is_forgotten(*log)
-        });
+        }) || self.misses_forgotten(status);
         let later = theirs.cut.is_some_and(|(cut, _)| self.ledger.cut().is_none_or(|ours| cut > ours));
         if missing && later {
             self.ask_for_snapshot(peer);
         }
+    }
+
+    /// Whether a peer has forgotten a log that is not complete here.
+    fn misses_forgotten(&self, status: &Status) -> bool {
+        let mut lowest: BTreeMap<RobotId, BootIndex> = BTreeMap::new();
+        for log in &status.logs {
+            let slot = lowest.entry(log.log.robot).or_insert(log.log.boot);
+            *slot = (*slot).min(log.log.boot);
+        }
+        lowest.into_iter().any(|(robot, boot)| {
+            boot.0.checked_sub(1).is_some_and(|before| {
+                !self.ledger.is_complete(LogId { robot, boot: BootIndex(before) })
+            })
+        })
     }
 
     /// A later life of this robot speaks while this one runs.

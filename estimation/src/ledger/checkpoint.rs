@@ -76,7 +76,7 @@ impl Checkpoint {
         for (id, seal) in self.seals.values() {
             entry(id, crate::fact::Body::Seal(seal.clone()));
         }
-        for (id, vote) in self.views.votes.values() {
+        for ((_, id), vote) in &self.views.votes {
             entry(id, crate::fact::Body::Vote(vote.clone()));
         }
         words.push(u64::from(self.views.epoch));

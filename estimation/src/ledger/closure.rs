@@ -146,6 +146,12 @@ impl Ledger {
         floor.is_some_and(|floor| log.boot < *floor)
     }
 
+    /// Whether a log has ended, and all of it is held or accounted for.
+    pub fn is_complete(&self, log: LogId) -> bool {
+        let ended = self.logs.get(&log).is_some_and(|log| log.limit.is_some_and(|limit| log.held() >= limit));
+        ended || self.is_forgotten(log)
+    }
+
     /// The logs of a robot that have not ended, and their lengths.
     pub fn open_logs(&self, robot: RobotId) -> impl Iterator<Item = (LogId, u64)> + '_ {
         let logs = self.logs.iter().filter(move |(id, log)| id.robot == robot && log.limit.is_none());
@@ -166,6 +172,13 @@ impl Ledger {
         let closing = self.closing.as_ref()?;
         let later = closing.seals.get(&robot).and_then(|seals| seals.values().next_back());
         later.or_else(|| closing.base.seals.get(&robot).map(|(_, seal)| seal))
+    }
+
+    /// The boot in which a robot has written its last seal held.
+    pub fn sealed_in(&self, robot: RobotId) -> Option<BootIndex> {
+        let closing = self.closing.as_ref()?;
+        let later = closing.seals.get(&robot).and_then(|seals| seals.keys().next_back());
+        later.or_else(|| closing.base.seals.get(&robot).map(|(id, _)| id)).map(|id| id.boot)
     }
 
     /// How far a log is held; what is over and forgotten is held to any length.
@@ -296,6 +309,10 @@ impl Ledger {
                 let limit = vote.held.iter().find(|(log, _)| *log == id).map_or(0, |(_, held)| *held);
                 if let Some(log) = self.logs.get_mut(&id) {
                     self.truncated |= log.end_at(limit);
+                    // What nobody vouches for was never there.
+                    if limit == 0 && log.held() == 0 {
+                        self.logs.remove(&id);
+                    }
                 }
             }
         }
@@ -369,7 +386,7 @@ impl Ledger {
         views.terms.retain(|term| term.until.is_none_or(|until| until >= cut));
 
         let mut logs = BTreeMap::new();
-        for (id, start) in &positions {
+        for (id, start) in positions.iter().filter(|(_, start)| **start > 0) {
             if let Some(log) = self.logs.get(id) {
                 let limit = limits.get(id).copied();
                 logs.insert(*id, LogBase { start: *start, chain: log.chain_before(*start), limit });
@@ -590,7 +607,8 @@ impl Ledger {
         if removed.is_empty() && added.is_empty() {
             return None;
         }
-        for (id, log) in self.logs.iter().filter(|(id, _)| removed.contains(&id.robot)) {
+        let known = self.logs.iter().filter(|(_, log)| log.held() > 0);
+        for (id, log) in known.filter(|(id, _)| removed.contains(&id.robot)) {
             held.entry(*id).or_insert(log.held());
         }
         joined.removed = removed.into_iter().collect();

@@ -134,7 +134,8 @@ impl Log {
     pub(super) fn end_at(&mut self, limit: u64) -> bool {
         self.limit = Some(self.limit.map_or(limit, |known| known.min(limit)));
         self.waiting.retain(|sequence, _| *sequence < limit);
-        self.held() > limit
+        // What a cut has accounted for stays.
+        self.held() > limit.max(self.base)
     }
 
     /// Forgets entries before `sequence`.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::rules::may_decide;
 use crate::fact::{EntryId, LogId, Vote};
-use crate::{BootIndex, RobotId, Timestamp};
+use crate::{BootIndex, RobotId, Sequence, Timestamp};
 
 /// One stay of a robot in the team.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,8 +28,8 @@ pub struct Views {
     pub epoch: u32,
     /// The stays that a cut can still depend on, by robot and time.
     pub terms: Vec<Term>,
-    /// The last vote of each robot in each epoch from the current one on.
-    pub votes: BTreeMap<(u32, RobotId), (EntryId, Vote)>,
+    /// The votes in each epoch from the current one on.
+    pub votes: BTreeMap<(u32, EntryId), Vote>,
 }
 
 impl Views {
@@ -45,38 +45,39 @@ impl Views {
 
     /// A robot's last vote in this epoch.
     pub fn vote(&self, robot: RobotId) -> Option<&Vote> {
-        self.votes.get(&(self.epoch, robot)).map(|(_, vote)| vote)
+        self.votes_of(robot).last().map(|(_, vote)| vote)
+    }
+
+    /// A robot's votes in this epoch, in the order in which it gave them.
+    fn votes_of(&self, robot: RobotId) -> impl DoubleEndedIterator<Item = (EntryId, &Vote)> {
+        let first = EntryId { robot, boot: BootIndex(0), sequence: Sequence(0) };
+        let last = EntryId { robot, boot: BootIndex(u32::MAX), sequence: Sequence(u64::MAX) };
+        self.votes.range((self.epoch, first)..=(self.epoch, last)).map(|((_, id), vote)| (*id, vote))
     }
 
     pub(super) fn hear(&mut self, id: EntryId, vote: &Vote) {
-        if vote.epoch < self.epoch {
-            return;
-        }
-        let slot = self.votes.entry((vote.epoch, id.robot)).or_insert_with(|| (id, vote.clone()));
-        if id > slot.0 {
-            *slot = (id, vote.clone());
+        if vote.epoch >= self.epoch {
+            self.votes.insert((vote.epoch, id), vote.clone());
         }
     }
 
-    /// The change that everyone who would stay has voted for alike, and the entries they did it in.
+    /// The change that everyone who would stay has voted for alike, and the entries they did it in. Whoever
+    /// has given more robots up since does not count; whoever has only raised a number does, and the first
+    /// such vote is the one.
     pub fn decided(&self) -> Option<(&Vote, Vec<EntryId>)> {
-        let candidates = self.votes.range((self.epoch, RobotId(0))..=(self.epoch, RobotId(u32::MAX)));
-        for ((_, voter), (_, vote)) in candidates {
-            if vote.removed.contains(voter) {
-                continue;
-            }
-            let members = self.active().count();
+        let members = self.active().count();
+        let voters = self.active().map(|term| term.robot);
+        for (_, vote) in voters.flat_map(|robot| self.votes_of(robot)) {
             let staying: Vec<RobotId> =
                 self.active().map(|term| term.robot).filter(|robot| !vote.removed.contains(robot)).collect();
             if !may_decide(members, staying.len(), vote.operator) {
                 continue;
             }
-            let given: Option<Vec<EntryId>> = staying
-                .iter()
-                .map(|robot| self.votes.get(&(self.epoch, *robot)))
-                .map(|given| given.filter(|(_, given)| given == vote).map(|(id, _)| *id))
-                .collect();
-            if let Some(entries) = given {
+            let given = |robot: &RobotId| {
+                self.vote(*robot).filter(|last| last.removed == vote.removed)?;
+                self.votes_of(*robot).find(|(_, given)| *given == vote).map(|(id, _)| id)
+            };
+            if let Some(entries) = staying.iter().map(given).collect() {
                 return Some((vote, entries));
             }
         }

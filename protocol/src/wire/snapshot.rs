@@ -92,7 +92,7 @@ struct WireClock(WireLog, i64, i64, i32);
 struct WireSealed(WireId, WireSeal);
 
 #[derive(Serialize, Deserialize)]
-struct WireVoted(u32, u32, WireId, WireVote);
+struct WireVoted(u32, WireId, WireVote);
 
 #[derive(Serialize, Deserialize)]
 struct WireTerm {
@@ -168,11 +168,11 @@ impl TryFrom<WireSealed> for (EntryId, Seal) {
     }
 }
 
-impl TryFrom<WireVoted> for ((u32, RobotId), (EntryId, Vote)) {
+impl TryFrom<WireVoted> for ((u32, EntryId), Vote) {
     type Error = ProtocolError;
 
-    fn try_from(WireVoted(epoch, robot, id, vote): WireVoted) -> Result<Self, ProtocolError> {
-        Ok(((epoch, RobotId(robot)), (id.into(), vote.try_into()?)))
+    fn try_from(WireVoted(epoch, id, vote): WireVoted) -> Result<Self, ProtocolError> {
+        Ok(((epoch, id.into()), vote.try_into()?))
     }
 }
 
@@ -249,7 +249,7 @@ pub fn encode(checkpoint: &Checkpoint) -> Vec<u8> {
     let votes = checkpoint.views.votes.iter();
     codec::put_list(
         &mut bytes,
-        votes.map(|((epoch, robot), (id, vote))| WireVoted(*epoch, robot.0, (*id).into(), vote.into())),
+        votes.map(|((epoch, id), vote)| WireVoted(*epoch, (*id).into(), vote.into())),
     );
     codec::put_list(&mut bytes, checkpoint.open.values().map(WireEntry::from));
     bytes
@@ -280,7 +280,7 @@ pub fn decode(bytes: &[u8]) -> Result<Checkpoint, ProtocolError> {
     let clocks = reader.list::<WireClock, (LogId, ClockMap)>("snapshot.clocks", most)?;
     let seals = reader.list::<WireSealed, (EntryId, Seal)>("snapshot.seals", most)?;
     let terms = reader.list::<WireTerm, Term>("snapshot.terms", most)?;
-    let votes = reader.list::<WireVoted, ((u32, RobotId), (EntryId, Vote))>("snapshot.votes", most)?;
+    let votes = reader.list::<WireVoted, ((u32, EntryId), Vote)>("snapshot.votes", most)?;
     let open = reader.list::<WireEntry, Entry>("snapshot.open", most)?;
     reader.end()?;
     Ok(Checkpoint {

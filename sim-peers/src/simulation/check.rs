@@ -36,6 +36,8 @@ impl std::fmt::Display for Violation {
 #[derive(Debug, Default)]
 pub struct Checks {
     pub now: Timestamp,
+    /// Size of the team.
+    robots: u32,
     said: BTreeMap<EntryId, (Fingerprint, Entry)>,
     /// Estimates by the set of entries they rest on.
     estimates: BTreeMap<Fingerprint, Fingerprint>,
@@ -44,12 +46,17 @@ pub struct Checks {
     /// How often a robot has been evicted.
     lives: BTreeMap<RobotId, u32>,
     /// Robots that may have lost facts they had said.
-    pub damaged: BTreeSet<RobotId>,
+    damaged: BTreeSet<RobotId>,
     pub most_kept: usize,
     pub cuts: u64,
 }
 
 impl Checks {
+    /// Nothing said yet by a team of `robots`.
+    pub fn new(robots: u32) -> Self {
+        Self { robots, ..Self::default() }
+    }
+
     pub fn violation(&self, robot: Option<RobotId>, what: impl Into<String>) -> Violation {
         Violation { time: self.now, robot, what: what.into() }
     }
@@ -80,7 +87,8 @@ impl Checks {
         self.cuts += 1;
     }
 
-    pub fn evicted(&mut self, robot: RobotId) {
+    /// What a robot has closed with words that it then lost, or that were not accepted, counts no more.
+    pub fn damages(&mut self, robot: RobotId) {
         *self.lives.entry(robot).or_insert(0) += 1;
         self.damaged.insert(robot);
     }
@@ -139,26 +147,47 @@ impl Checks {
     fn accepted(&self, node: &Node) -> Vec<Entry> {
         let held: BTreeMap<LogId, u64> =
             node.ledger().digests().map(|digest| (digest.log, digest.held)).collect();
-        // Logs that a snapshot has forgotten ended where their author said, or where he was evicted.
+        // Logs that a snapshot has forgotten ended where a change of the membership says, or else where an
+        // accepted seal of their author does; later boots first, because their seals say it.
+        let evicted = self.evicted_at();
         let mut ends: BTreeMap<LogId, u64> = BTreeMap::new();
-        for (_, entry) in self.said.values() {
-            match &entry.body {
-                Body::Seal(seal) => {
-                    for log in seal.logs.iter().filter(|log| log.last) {
-                        let id = LogId { robot: entry.id.robot, boot: log.boot };
-                        ends.entry(id).or_insert(log.length);
+        let logs: BTreeSet<LogId> = self.said.keys().map(|id| id.log()).collect();
+        for log in logs.into_iter().rev() {
+            let end = held.get(&log).or_else(|| evicted.get(&log)).or_else(|| ends.get(&log)).copied();
+            let Some(end) = end else { continue };
+            ends.insert(log, end);
+            for (_, entry) in self.said.range(first_of(log)..).map(|(_, said)| said) {
+                if entry.id.log() != log || entry.id.sequence.0 >= end {
+                    break;
+                }
+                if let Body::Seal(seal) = &entry.body {
+                    for older in seal.logs.iter().filter(|older| older.last) {
+                        let id = LogId { robot: log.robot, boot: older.boot };
+                        ends.entry(id).or_insert(older.length);
                     }
                 }
-                Body::Vote(vote) => ends.extend(vote.held.iter().copied()),
-                _ => {}
             }
         }
-        let ended = |log: &LogId| ends.get(log).copied();
-        let inside = |id: &EntryId| {
-            let end = held.get(&id.log()).copied().or_else(|| ended(&id.log()));
-            end.is_some_and(|end| id.sequence.0 < end)
-        };
+        let inside = |id: &EntryId| ends.get(&id.log()).is_some_and(|end| id.sequence.0 < *end);
         self.said.iter().filter(|(id, _)| inside(id)).map(|(_, (_, entry))| entry.clone()).collect()
+    }
+
+    /// How much of the logs of evicted robots those who stayed agreed on: votes that two robots gave alike,
+    /// or an operator's in a team of two.
+    fn evicted_at(&self) -> BTreeMap<LogId, u64> {
+        let mut ends = BTreeMap::new();
+        let votes = self.said.values().filter_map(|(_, entry)| match &entry.body {
+            Body::Vote(vote) if !vote.removed.is_empty() => Some((entry.id.robot, vote)),
+            _ => None,
+        });
+        let votes: Vec<_> = votes.collect();
+        for (voter, vote) in &votes {
+            let seconded = votes.iter().any(|(other, given)| other != voter && given == vote);
+            if seconded || (vote.operator && self.robots == 2) {
+                ends.extend(vote.held.iter().copied());
+            }
+        }
+        ends
     }
 
     /// After healing: the estimate is the oracle's over what is accepted, nothing of it is missing, and what
@@ -227,6 +256,10 @@ impl Checks {
         }
         Ok(())
     }
+}
+
+fn first_of(log: LogId) -> EntryId {
+    EntryId { robot: log.robot, boot: log.boot, sequence: pleiad_estimation::Sequence(0) }
 }
 
 /// Says if `P + 1e-12 max(diag) I` is not positive definite; then `eig_min < -1e-12 eig_max` may hold.

@@ -101,7 +101,7 @@ pub fn run(seed: u64, options: &Options) -> Result<Outcome, Violation> {
         due: BTreeMap::new(),
         count: 0,
         chance: Chance::new(seed, 4),
-        checks: Checks::default(),
+        checks: Checks::new(plan.robots),
         outcome: Outcome { robots: plan.robots, ..Outcome::default() },
         plan,
     };
@@ -208,7 +208,7 @@ impl Run<'_> {
             }
             Blow::PowerLoss { robot, back_s } => {
                 let robot = RobotId(robot);
-                self.checks.damaged.insert(robot);
+                self.checks.damages(robot);
                 if self.die(robot, back_s)
                     && let Some(robot) = self.robots.get_mut(&robot)
                 {
@@ -217,7 +217,7 @@ impl Run<'_> {
             }
             Blow::DiskLoss { robot, back_s } => {
                 let robot = RobotId(robot);
-                self.checks.damaged.insert(robot);
+                self.checks.damages(robot);
                 if self.die(robot, back_s)
                     && let Some(robot) = self.robots.get_mut(&robot)
                 {
@@ -383,6 +383,7 @@ impl Run<'_> {
                 }
             }
             Command::Publish(entries) => {
+                if std::env::var("DBG").is_ok() { for e in &entries { if matches!(e.body, pleiad_estimation::fact::Body::Vote(_)|pleiad_estimation::fact::Body::Boot(_)) { eprintln!("{} {}: {:?}", self.now, e.id, e.body); } } }
                 for entry in &entries {
                     self.checks.says(entry)?;
                 }
@@ -411,10 +412,11 @@ impl Run<'_> {
     }
 
     fn notice(&mut self, id: RobotId, notice: &Notice) -> Result<(), Violation> {
+        if std::env::var("DBG").is_ok() { eprintln!("{} robot {id}: {notice}", self.now); }
         match notice {
             Notice::Evicted { .. } => {
                 self.outcome.evictions += 1;
-                self.checks.evicted(id);
+                self.checks.damages(id);
             }
             Notice::SnapshotTaken { .. } => {
                 self.outcome.taken_over += 1;
