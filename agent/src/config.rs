@@ -20,8 +20,8 @@ use checks::{finite, not_negative, positive, value};
 pub use model::RobotCorrection;
 pub use sections::{
     AngleNoise, BusMode, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LedgerSection,
-    LengthNoise, MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection, Strategy,
-    VelocityName, YawName,
+    LengthNoise, MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection,
+    Strategy, VelocityName, YawName,
 };
 
 /// Why a configuration cannot be used.

@@ -197,9 +197,7 @@ impl Journal {
 /// Whether records have to be on the disk itself before anything that follows from them is published: a boot
 /// said to others and forgotten here would be said again with other words.
 pub fn must_sync(records: &[Record], robot: RobotId) -> bool {
-    let boot = |record: &Record| {
-        matches!(record, Record::Entry(Entry { id, body: Body::Boot(_), .. }) if id.robot == robot)
-    };
+    let boot = |record: &Record| matches!(record, Record::Entry(Entry { id, body: Body::Boot(_), .. }) if id.robot == robot);
     records.iter().any(boot)
 }
 

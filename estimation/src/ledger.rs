@@ -80,7 +80,9 @@ pub enum Refusal {
     #[error("the robot is quarantined: it published two different entries under one identity")]
     Quarantined,
     /// Its log has ended before, or the cut has passed it.
-    #[error("beyond what is accepted of its log: it came after the team had closed that time, or was lost by its author")]
+    #[error(
+        "beyond what is accepted of its log: it came after the team had closed that time, or was lost by its author"
+    )]
     Expired,
     /// Its robot does not belong to the team, or not with this boot.
     #[error("its robot does not belong to the team any more, or not yet")]
@@ -230,11 +232,10 @@ impl Ledger {
             return Some(Refusal::Expired);
         }
         match self.logs.get(&id.log()) {
-            Some(log) => {
-                log.limit.is_some_and(|limit| id.sequence.0 >= limit).then_some(Refusal::Expired)
-            }
+            Some(log) => log.limit.is_some_and(|limit| id.sequence.0 >= limit).then_some(Refusal::Expired),
             None => {
-                let member = closing.views.active().any(|term| term.robot == id.robot && id.boot >= term.boot);
+                let member =
+                    closing.views.active().any(|term| term.robot == id.robot && id.boot >= term.boot);
                 (!member).then_some(Refusal::NotAMember)
             }
         }

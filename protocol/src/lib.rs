@@ -20,7 +20,8 @@ mod wire;
 pub use error::{KeyError, ProtocolError};
 pub use keys::{Key, Kind, SensorKind, TeamName};
 pub use message::{
-    Message, decode_checkpoint, decode_entries, decode_sample, encode_checkpoint, encode_entries, encode_sample,
+    Message, decode_checkpoint, decode_entries, decode_sample, encode_checkpoint, encode_entries,
+    encode_sample,
 };
 pub use messages::{
     ClosureStatus, ControlReply, ControlRequest, Estimate, FactCounts, FactsRequest, LogRange, LogStatus,

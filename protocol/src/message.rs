@@ -8,8 +8,8 @@ use crate::codec::{self, Reader};
 use crate::error::ProtocolError;
 use crate::limits;
 use crate::messages::{
-    ControlReply, ControlRequest, Estimate, FactsRequest, SensorAck, SensorBatch, SnapshotPart, SnapshotRequest,
-    Status,
+    ControlReply, ControlRequest, Estimate, FactsRequest, SensorAck, SensorBatch, SnapshotPart,
+    SnapshotRequest, Status,
 };
 use crate::wire::{WireEntry, WireEstimate, WireSample};
 use crate::wire::{control, snapshot, status, transfer};

@@ -1,6 +1,6 @@
 //! Runs simulated schedules of a team: `cargo run -p pleiad-tests --features planted --example schedules -- --seeds A..B`.
 //!
-//! `--partitions` leaves out everything but losses and partitions. `--resume FILE` keeps there how far it
+//! `--partitions` leaves out everything but losses and partitions; `--evictions` adds evictions. `--resume FILE` keeps there how far it
 //! has come, and goes on from there. `--plant NAME` plants a mistake and tells which seed finds it.
 //! A seed that fails is printed with the command that replays it.
 
@@ -41,13 +41,19 @@ fn main() -> Result<(), Box<dyn Error>> {
                 (first, end) = (from.parse()?, to.parse()?);
             }
             "--partitions" => options.partitions_only = true,
+            "--evictions" => options.evictions = true,
             "--keep-going" => keep_going = true,
             "--resume" => resume = Some(PathBuf::from(value()?)),
             "--plant" => {
                 plant = value()?;
                 options.planted = Some(planted(&plant)?);
             }
-            other => return Err(format!("{other}: expected --seeds, --partitions, --keep-going, --resume or --plant").into()),
+            other => {
+                return Err(format!(
+                    "{other}: expected --seeds, --partitions, --keep-going, --resume or --plant"
+                )
+                .into());
+            }
         }
     }
     if let Some(path) = resume.as_ref().filter(|path| path.exists()) {
@@ -62,10 +68,14 @@ fn main() -> Result<(), Box<dyn Error>> {
             Err(violation) => {
                 failed += 1;
                 println!("seed {seed}: {violation}");
-                let partitions = if options.partitions_only { " --partitions" } else { "" };
+                let kind = match (options.partitions_only, options.evictions) {
+                    (true, _) => " --partitions",
+                    (false, true) => " --evictions",
+                    (false, false) => "",
+                };
                 let plant = if plant.is_empty() { String::new() } else { format!(" --plant {plant}") };
                 println!(
-                    "replay: cargo run -p pleiad-tests --features planted --example schedules -- --seeds {seed}..{}{partitions}{plant}",
+                    "replay: cargo run -p pleiad-tests --features planted --example schedules -- --seeds {seed}..{}{kind}{plant}",
                     seed + 1
                 );
                 if end - first == 1 {

@@ -10,7 +10,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
-use pleiad_agent::config::{AgentConfig, BusSection, ClockSection, FilterSection, OutputSection, Strategy};
+use pleiad_agent::config::{
+    AgentConfig, BusSection, ClockSection, FilterSection, LedgerSection, OutputSection, Strategy,
+};
 use pleiad_agent::journal::Journal;
 use pleiad_agent::{Record, driver};
 use pleiad_bus::{Bus, ZenohBus, ZenohConfig};

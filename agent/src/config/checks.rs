@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 
 use pleiad_estimation::fact::{ClockMap, Noise};
+use pleiad_estimation::ledger::Closure;
 use pleiad_estimation::motion::{DifferentialDrive, MotionModel, MotionNoise, YawSource};
 use pleiad_estimation::sample::Relative;
-use pleiad_estimation::ledger::Closure;
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 
 use super::sections::{
-    AngleNoise, ClockSection, LedgerSection, LengthNoise, MotionSection, PriorSection, SensorsSection, YawName,
+    AngleNoise, ClockSection, LedgerSection, LengthNoise, MotionSection, PriorSection, SensorsSection,
+    YawName,
 };
 use super::{ClosingConfig, ConfigError, Prior};
 

@@ -310,7 +310,8 @@ impl Node {
             }
         }
         // What this robot misses is not kept there any more: only the snapshot helps.
-        let held: BTreeMap<LogId, u64> = self.ledger.digests().map(|digest| (digest.log, digest.held)).collect();
+        let held: BTreeMap<LogId, u64> =
+            self.ledger.digests().map(|digest| (digest.log, digest.held)).collect();
         let missing = theirs.firsts.iter().any(|(log, first)| {
             held.get(log).copied().unwrap_or(0) < *first && !self.ledger.is_forgotten(*log)
         }) || self.misses_forgotten(status);
@@ -328,9 +329,9 @@ impl Node {
             *slot = (*slot).min(log.log.boot);
         }
         lowest.into_iter().any(|(robot, boot)| {
-            boot.0.checked_sub(1).is_some_and(|before| {
-                !self.ledger.is_complete(LogId { robot, boot: BootIndex(before) })
-            })
+            boot.0
+                .checked_sub(1)
+                .is_some_and(|before| !self.ledger.is_complete(LogId { robot, boot: BootIndex(before) }))
         })
     }
 
@@ -381,9 +382,12 @@ impl Node {
         records.extend(self.ledger.entries_after_cut().cloned().map(Record::Entry));
         for segment in self.segments.iter() {
             let (boot, odom) = (segment.boot, segment.odom);
-            records.extend(
-                segment.trajectory.ticks().map(|(time, state)| Record::Tick { boot, time, state, odom }),
-            );
+            records.extend(segment.trajectory.ticks().map(|(time, state)| Record::Tick {
+                boot,
+                time,
+                state,
+                odom,
+            }));
         }
         records
     }

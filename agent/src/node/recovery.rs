@@ -1,9 +1,9 @@
 //! A node from the journal of its former life.
 
-use pleiad_estimation::ledger::Checkpoint;
-use pleiad_estimation::{BootIndex, Timestamp};
 use pleiad_estimation::fact::{Body, Boot, Entry};
+use pleiad_estimation::ledger::Checkpoint;
 use pleiad_estimation::sample::{Reading, Sample};
+use pleiad_estimation::{BootIndex, Timestamp};
 
 use super::{Node, Record};
 use crate::config::NodeConfig;

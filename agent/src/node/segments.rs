@@ -21,15 +21,33 @@ pub(super) struct Segment {
 }
 
 impl Segments {
-    pub(super) fn begin(&mut self, boot: BootIndex, time: Timestamp, nominal: Pose2, odom: Pose2, horizon: usize) {
+    pub(super) fn begin(
+        &mut self,
+        boot: BootIndex,
+        time: Timestamp,
+        nominal: Pose2,
+        odom: Pose2,
+        horizon: usize,
+    ) {
         self.all.push(Segment { boot, trajectory: NominalTrajectory::new(time, nominal, horizon), odom });
     }
 
     /// Goes on, or begins, with a state from the journal.
-    pub(super) fn restore(&mut self, boot: BootIndex, time: Timestamp, state: NominalState, odom: Pose2, horizon: usize) {
+    pub(super) fn restore(
+        &mut self,
+        boot: BootIndex,
+        time: Timestamp,
+        state: NominalState,
+        odom: Pose2,
+        horizon: usize,
+    ) {
         match self.all.last_mut() {
             Some(last) if last.boot == boot => last.trajectory.restore(time, state),
-            _ => self.all.push(Segment { boot, trajectory: NominalTrajectory::resume(time, state, horizon), odom }),
+            _ => self.all.push(Segment {
+                boot,
+                trajectory: NominalTrajectory::resume(time, state, horizon),
+                odom,
+            }),
         }
     }
 

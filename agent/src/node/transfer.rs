@@ -2,9 +2,7 @@
 
 use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::{RobotId, Timestamp};
-use pleiad_protocol::{
-    SnapshotPart, SnapshotRequest, decode_checkpoint, encode_checkpoint, limits,
-};
+use pleiad_protocol::{SnapshotPart, SnapshotRequest, decode_checkpoint, encode_checkpoint, limits};
 
 use super::{Command, Node, Notice, Record};
 

@@ -78,7 +78,12 @@ impl Node {
                 let Some(point) = known.checked_sub(1).map(|last| &history[last]) else { continue };
                 // A boot that began at this very instant has taken over.
                 if point.boot == *boot {
-                    estimates.push(settled(time, *boot, odom.compose(&state.nominal), point.estimate(&state)));
+                    estimates.push(settled(
+                        time,
+                        *boot,
+                        odom.compose(&state.nominal),
+                        point.estimate(&state),
+                    ));
                 }
             }
         }

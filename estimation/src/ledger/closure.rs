@@ -164,7 +164,9 @@ impl Ledger {
     }
 
     pub(super) fn base_joint(&self) -> Joint {
-        self.closing.as_ref().map_or_else(|| Joint::new(self.config.form), |closing| closing.base.joint.clone())
+        self.closing
+            .as_ref()
+            .map_or_else(|| Joint::new(self.config.form), |closing| closing.base.joint.clone())
     }
 
     /// The last seal held of a robot, whether it counts yet or not.
@@ -191,21 +193,23 @@ impl Ledger {
 
     /// Whether a seal counts: everything it speaks of is held, and nothing speaks against its author.
     fn counts_here(&self, closing: &Closing, id: EntryId, seal: &Seal) -> bool {
-        let logs = seal.logs.iter().all(|log| {
-            self.holds(LogId { robot: id.robot, boot: log.boot }, log.length)
-        });
+        let logs =
+            seal.logs.iter().all(|log| self.holds(LogId { robot: id.robot, boot: log.boot }, log.length));
         // Whoever has voted to evict a robot no longer rests on what came from it later.
         let voted = closing.views.vote(closing.owner);
         let given_up = voted.is_some_and(|vote| {
             vote.removed.contains(&id.robot)
-                && vote.held.iter().find(|(log, _)| *log == id.log()).is_none_or(|(_, held)| id.sequence.0 >= *held)
+                && vote
+                    .held
+                    .iter()
+                    .find(|(log, _)| *log == id.log())
+                    .is_none_or(|(_, held)| id.sequence.0 >= *held)
         });
         logs && !given_up
     }
 
     fn standing(&self, closing: &Closing, term: &Term) -> Standing {
-        let mut standing =
-            Standing { observed: Timestamp::MIN, answered: Timestamp::MIN, from: term.from };
+        let mut standing = Standing { observed: Timestamp::MIN, answered: Timestamp::MIN, from: term.from };
         let base = closing.base.seals.get(&term.robot).map(|(id, seal)| (id, seal));
         let later = closing.seals.get(&term.robot).into_iter().flatten();
         // A log is said to have ended once, so that a later seal rests on what earlier ones speak of.
@@ -221,6 +225,10 @@ impl Ledger {
     /// Up to when the owner may say that it has answered everything that names it.
     pub fn answerable(&self) -> Timestamp {
         let Some(closing) = &self.closing else { return Timestamp::MIN };
+        #[cfg(feature = "planted")]
+        if self.planted == Some(super::Planted::AnswerBlindly) {
+            return Timestamp::MAX;
+        }
         let members: Vec<Standing> =
             closing.views.active().map(|term| self.standing(closing, term)).collect();
         // Looking through what is owed is worth it only if something would follow.
@@ -228,10 +236,6 @@ impl Ledger {
         let answered = self.seal_of(closing.owner).map_or(Timestamp::MIN, |seal| seal.answered);
         if sealed <= answered {
             return answered;
-        }
-        #[cfg(feature = "planted")]
-        if self.planted == Some(super::Planted::AnswerBlindly) {
-            return sealed;
         }
         let owed = self.unanswered(closing.owner).map(|(_, time)| time).min();
         closing.closure.floor(rules::answerable(members, owed))
@@ -373,7 +377,9 @@ impl Ledger {
                 Body::Observation(observation) if observation.time > cut => {
                     open.insert(entry.id, entry.clone());
                 }
-                Body::Half(half) if self.still_open(half.observation, cut, position(&half.observation.log()), &limits) => {
+                Body::Half(half)
+                    if self.still_open(half.observation, cut, position(&half.observation.log()), &limits) =>
+                {
                     open.insert(entry.id, entry.clone());
                 }
                 Body::Boot(_) | Body::Observation(_) | Body::Half(_) => {}
@@ -504,6 +510,19 @@ impl Ledger {
                 entries.iter().for_each(|id| raise(id.log(), id.sequence.0 + 1));
             }
         }
+        // Votes can lie beyond the first seal that reaches the cut, and more seals before them.
+        let accounted = |id: &EntryId| positions.get(&id.log()).is_some_and(|to| id.sequence.0 < *to);
+        let seals = closing.seals.values().flatten().filter(|(id, _)| accounted(id));
+        let ended = seals.flat_map(|(id, seal)| {
+            let last = seal.logs.iter().filter(|log| log.last);
+            last.map(|log| (LogId { robot: id.robot, boot: log.boot }, log.length))
+        });
+        let ended: Vec<(LogId, u64)> = ended.filter(|(log, _)| !forgotten(*log)).collect();
+        for (log, length) in ended {
+            limits.entry(log).or_insert(length);
+            let position = positions.entry(log).or_insert(0);
+            *position = (*position).max(length);
+        }
         (positions, limits)
     }
 
@@ -518,9 +537,8 @@ impl Ledger {
         if self.folded.is_none() {
             self.joint = checkpoint.joint.clone();
         }
-        self.profiles.retain(|(log, _), _| {
-            checkpoint.floors.get(&log.robot).is_none_or(|floor| log.boot >= *floor)
-        });
+        self.profiles
+            .retain(|(log, _), _| checkpoint.floors.get(&log.robot).is_none_or(|floor| log.boot >= *floor));
         let floors = checkpoint.floors.clone();
         self.logs.retain(|id, _| floors.get(&id.robot).is_none_or(|floor| id.boot >= *floor));
         for (id, base) in &checkpoint.logs {
@@ -532,7 +550,9 @@ impl Ledger {
                 let reached = |id: &EntryId| {
                     checkpoint.logs.get(&id.log()).is_some_and(|base| id.sequence.0 < base.start)
                 };
-                seals.retain(|id, _| !reached(id) && floors.get(&id.robot).is_none_or(|floor| id.boot >= *floor));
+                seals.retain(|id, _| {
+                    !reached(id) && floors.get(&id.robot).is_none_or(|floor| id.boot >= *floor)
+                });
             }
             let epoch = checkpoint.views.epoch;
             closing.decisions.retain(|decision| decision.vote.epoch >= epoch);
@@ -551,9 +571,10 @@ impl Ledger {
     /// Forgets entries that no member can ask for any more, because all have closed past them.
     fn release(&mut self) {
         let Some(closing) = &self.closing else { return };
-        let reached = closing.views.active().map(|term| {
-            self.seal_of(term.robot).map_or(Timestamp::MIN, |seal| seal.closed)
-        });
+        let reached = closing
+            .views
+            .active()
+            .map(|term| self.seal_of(term.robot).map_or(Timestamp::MIN, |seal| seal.closed));
         let reached = reached.min().unwrap_or(Timestamp::MIN).min(closing.base.time);
         let Some(closing) = &mut self.closing else { return };
         let over = closing.cuts.partition_point(|(cut, _)| *cut <= reached);
@@ -588,7 +609,8 @@ impl Ledger {
                 continue;
             }
             let Some(vote) = views.vote(term.robot) else { continue };
-            let agreed = vote.operator || vote.removed.iter().all(|robot| removed.contains(robot) || wish.absent.contains(robot));
+            let agreed = vote.operator
+                || vote.removed.iter().all(|robot| removed.contains(robot) || wish.absent.contains(robot));
             if vote.removed.contains(&owner) || !agreed {
                 continue;
             }
@@ -631,15 +653,17 @@ impl Ledger {
 
     /// Everything kept beyond the last cut, to be written to a new journal after the snapshot.
     pub fn entries_after_cut(&self) -> impl Iterator<Item = &Entry> {
-        self.logs.values().flat_map(Log::all).filter(|entry| {
-            self.logs.get(&entry.id.log()).is_some_and(|log| entry.id.sequence.0 >= log.base)
-        })
+        self.logs
+            .values()
+            .flat_map(Log::all)
+            .filter(|entry| self.logs.get(&entry.id.log()).is_some_and(|log| entry.id.sequence.0 >= log.base))
     }
 }
 
 /// How far an evicted robot's promises reach within what is accepted of its logs.
 fn sealed_within(closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
-    let accepted = |id: &EntryId| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
+    let accepted =
+        |id: &EntryId| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
     let later = closing.seals.get(&robot).into_iter().flatten();
     let seal = later.filter(|(id, _)| accepted(id)).last().map(|(_, seal)| seal);
     let seal = seal.or_else(|| closing.base.seals.get(&robot).map(|(_, seal)| seal));

@@ -92,7 +92,13 @@ impl Log {
     }
 
     pub(super) fn digest(&self, log: LogId) -> LogDigest {
-        LogDigest { log, held: self.held(), chain: self.chain, first: self.first, waiting: self.waiting.len() }
+        LogDigest {
+            log,
+            held: self.held(),
+            chain: self.chain,
+            first: self.first,
+            waiting: self.waiting.len(),
+        }
     }
 
     /// Chain over the entries before `sequence`.

@@ -14,7 +14,7 @@ pub enum Planted {
     MixBoots,
     /// The past is closed by what has been acknowledged.
     CloseByNumbers,
-    /// A robot says it has answered everything, without looking.
+    /// A robot says it has answered everything, without waiting for what the others have still to say.
     AnswerBlindly,
     /// Entries go out before they are in the journal. Of the node, not of the ledger.
     PublishFirst,

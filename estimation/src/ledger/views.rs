@@ -90,8 +90,7 @@ impl Views {
         for term in &mut self.terms {
             if term.until.is_none() && vote.removed.contains(&term.robot) {
                 term.until = Some(sealed(term.robot).max(term.from));
-                term.limits =
-                    vote.held.iter().copied().filter(|(log, _)| log.robot == term.robot).collect();
+                term.limits = vote.held.iter().copied().filter(|(log, _)| log.robot == term.robot).collect();
             }
         }
         for (robot, boot) in &vote.added {

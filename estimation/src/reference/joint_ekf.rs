@@ -229,7 +229,9 @@ impl Run {
         let ad = adjoint(&shift);
         let mut owed = continuation.last.noise_sum.to_matrix() - estimate.last.noise_sum.to_matrix();
         // Carried on from before its own last event: its journal had lost the end. Nothing is owed then.
-        if (0..3).any(|axis| owed[(axis, axis)] < -1e-9 * continuation.last.noise_sum.to_matrix()[(axis, axis)]) {
+        if (0..3)
+            .any(|axis| owed[(axis, axis)] < -1e-9 * continuation.last.noise_sum.to_matrix()[(axis, axis)])
+        {
             owed = Matrix3::zeros();
         }
         estimate.boot = index;

@@ -272,8 +272,11 @@ pub fn decode(bytes: &[u8]) -> Result<Checkpoint, ProtocolError> {
     let form = if head.additive { ErrorForm::Additive } else { ErrorForm::Invariant };
     let parts = JointParts { members, lower, updates: head.updates };
     let limit = (3 * parts.members.len() * (3 * parts.members.len() + 1) / 2) as u64;
-    let joint = Joint::from_parts(form, parts)
-        .ok_or(ProtocolError::TooMany { field: "snapshot.covariance".into(), found, limit })?;
+    let joint = Joint::from_parts(form, parts).ok_or(ProtocolError::TooMany {
+        field: "snapshot.covariance".into(),
+        found,
+        limit,
+    })?;
     let logs = reader.list::<WireLogBase, (LogId, LogBase)>("snapshot.logs", most)?;
     let floors = reader.list::<WireFloor, (RobotId, BootIndex)>("snapshot.floors", most)?;
     let profiles = reader.list::<WireProfile, ((LogId, u16), Noise)>("snapshot.profiles", most)?;
@@ -294,6 +297,8 @@ pub fn decode(bytes: &[u8]) -> Result<Checkpoint, ProtocolError> {
         seals: seals.into_iter().map(|(id, seal)| (id.robot, (id, seal))).collect(),
         views: Views { epoch: head.epoch, terms, votes: votes.into_iter().collect() },
         open: open.into_iter().map(|entry| (entry.id, entry)).collect(),
-        counts: FactCounts::from_numbers(head.counts.map(|count| usize::try_from(count).unwrap_or(usize::MAX))),
+        counts: FactCounts::from_numbers(
+            head.counts.map(|count| usize::try_from(count).unwrap_or(usize::MAX)),
+        ),
     })
 }

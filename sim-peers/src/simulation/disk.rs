@@ -65,9 +65,7 @@ impl Disk {
             let frame = journal::frame(frame);
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a length")]
             let kept = match torn {
-                Some(share) if index == last && index >= self.synced => {
-                    (frame.len() as f64 * share) as usize
-                }
+                Some(share) if index == last && index >= self.synced => (frame.len() as f64 * share) as usize,
                 _ => frame.len(),
             };
             bytes.extend(&frame[..kept]);

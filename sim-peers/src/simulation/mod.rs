@@ -17,7 +17,7 @@ pub use check::Violation;
 pub use plan::Plan;
 #[cfg(feature = "planted")]
 pub use pleiad_estimation::ledger::Planted;
-pub use run::{Outcome, run};
+pub use run::{Hour, Outcome, operate, run};
 
 /// What is simulated besides what the seed decides.
 #[derive(Clone, Debug, Default)]
@@ -25,6 +25,8 @@ pub struct Options {
     /// A mistake in every node.
     #[cfg(feature = "planted")]
     pub planted: Option<Planted>,
-    /// Only losses and partitions: no process dies, no disk fails, nobody is evicted.
+    /// Only losses and partitions: no process dies and no disk fails.
     pub partitions_only: bool,
+    /// Operators and majorities evict robots too.
+    pub evictions: bool,
 }

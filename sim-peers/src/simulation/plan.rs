@@ -13,32 +13,54 @@ pub enum Blow {
     Partition(Vec<u32>),
     Heal,
     /// The process of a robot is killed after so many more commands; it comes back after seconds.
-    Kill { robot: u32, commands: u32, back_s: f64 },
+    Kill {
+        robot: u32,
+        commands: u32,
+        back_s: f64,
+    },
     /// The power goes, with what was not synced.
-    PowerLoss { robot: u32, back_s: f64 },
+    PowerLoss {
+        robot: u32,
+        back_s: f64,
+    },
     /// The disk is lost.
-    DiskLoss { robot: u32, back_s: f64 },
+    DiskLoss {
+        robot: u32,
+        back_s: f64,
+    },
     /// The disk is full for some time.
-    DiskFull { robot: u32, seconds: f64 },
+    DiskFull {
+        robot: u32,
+        seconds: f64,
+    },
     /// The operator evicts a robot, at one of the others.
-    Evict { robot: u32, at: u32 },
+    Evict {
+        robot: u32,
+        at: u32,
+    },
 }
 
 /// The whole plan, by time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
+    /// Size of the team.
     pub robots: u32,
+    /// Virtual time until everything heals, s.
     pub seconds: f64,
     /// The team closes its past on a grid of this distance; `None` if it keeps everything.
     pub cell_s: Option<f64>,
     /// Robots silent for longer are evicted by the majority.
     pub evict_after_s: Option<f64>,
+    /// The nominal trajectories begin anew that far from their origin, m.
     pub rebase_m: f64,
+    /// What links do at first.
     pub weather: Weather,
+    /// What is done to the team, by time in s.
     pub blows: Vec<(f64, Blow)>,
 }
 
 impl Plan {
+    /// The plan of a seed.
     pub fn new(seed: u64, options: &Options) -> Self {
         let mut chance = Chance::new(seed, 1);
         let robots = 2 + chance.below(3);
@@ -50,7 +72,7 @@ impl Plan {
             robots,
             seconds,
             cell_s,
-            evict_after_s: (hard && chance.happens(0.15)).then_some(8.0),
+            evict_after_s: (chance.happens(0.15) && options.evictions).then_some(8.0),
             rebase_m,
             weather: weather(&mut chance),
             blows: Vec::new(),
@@ -66,13 +88,13 @@ impl Plan {
             plan.blows.push((moment(&mut chance), Blow::Weather(weather(&mut chance))));
         }
         if hard {
-            plan.strike(&mut chance, seconds);
+            plan.strike(&mut chance, seconds, options.evictions);
         }
         plan.blows.sort_by(|a, b| a.0.total_cmp(&b.0));
         plan
     }
 
-    fn strike(&mut self, chance: &mut Chance, seconds: f64) {
+    fn strike(&mut self, chance: &mut Chance, seconds: f64, evictions: bool) {
         let robots = self.robots;
         let moment = |chance: &mut Chance| chance.between(1.0, seconds - 2.0);
         for _ in 0..chance.below(4) {
@@ -87,7 +109,7 @@ impl Plan {
             };
             self.blows.push((at, blow));
         }
-        if self.cell_s.is_some() && chance.happens(0.15) {
+        if self.cell_s.is_some() && evictions && chance.happens(0.15) {
             let robot = 1 + chance.below(robots);
             let other = 1 + (robot - 1 + 1 + chance.below(robots - 1)) % robots;
             // Out of reach for long enough that somebody might give it up.
@@ -101,9 +123,8 @@ impl Plan {
 
     /// Whether facts that were published can be lost for good.
     pub fn can_lose(&self) -> bool {
-        let losing = |blow: &Blow| {
-            matches!(blow, Blow::PowerLoss { .. } | Blow::DiskLoss { .. } | Blow::Evict { .. })
-        };
+        let losing =
+            |blow: &Blow| matches!(blow, Blow::PowerLoss { .. } | Blow::DiskLoss { .. } | Blow::Evict { .. });
         self.evict_after_s.is_some() || self.blows.iter().any(|(_, blow)| losing(blow))
     }
 }

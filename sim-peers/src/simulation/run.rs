@@ -112,6 +112,69 @@ pub fn run(seed: u64, options: &Options) -> Result<Outcome, Violation> {
     Ok(run.finish())
 }
 
+/// What a team keeps after so long.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hour {
+    /// Virtual time, h.
+    pub hour: f64,
+    /// Entries, facts and answers in the memory of the robot that keeps most.
+    pub kept: usize,
+    /// Records in the longest journal.
+    pub records: usize,
+    /// Facts used so far.
+    pub facts: usize,
+    /// Cuts closed so far, by all robots together.
+    pub cuts: u64,
+}
+
+/// A team that simply works for hours, on links that lose a tenth; `report` is told what it keeps.
+///
+/// # Errors
+/// As [`run`].
+pub fn operate(robots: u32, hours: f64, mut report: impl FnMut(Hour)) -> Result<(), Violation> {
+    let weather = Weather { loss: 0.1, burst: 5.0, delay_s: 0.01, jitter_s: 0.05, repeated: 0.05 };
+    let options = Options::default();
+    let plan = Plan {
+        robots,
+        seconds: hours * 3600.0,
+        cell_s: Some(5.0),
+        evict_after_s: None,
+        rebase_m: 300.0,
+        weather,
+        blows: Vec::new(),
+    };
+    let mut run = Run {
+        options: &options,
+        now: Timestamp(0),
+        network: Network::new(Chance::new(1, 3), weather),
+        world: World::new(1, robots),
+        robots: BTreeMap::new(),
+        due: BTreeMap::new(),
+        count: 0,
+        chance: Chance::new(1, 4),
+        checks: Checks::new(robots).for_long(),
+        outcome: Outcome::default(),
+        plan,
+    };
+    run.set_up()?;
+    let steps = (hours * 4.0).ceil();
+    let mut step = 0.0;
+    while step < steps {
+        step += 1.0;
+        run.until(Timestamp::from_seconds(hours * 3600.0 * step / steps))?;
+        let nodes = run.robots.values().filter_map(|robot| robot.node.as_ref());
+        let facts = nodes.map(|node| node.ledger().counts().used).max().unwrap_or(0);
+        report(Hour {
+            hour: hours * step / steps,
+            kept: std::mem::take(&mut run.checks.most_kept),
+            records: std::mem::take(&mut run.outcome.most_records),
+            facts,
+            cuts: run.checks.cuts,
+        });
+    }
+    Ok(())
+}
+
 impl Run<'_> {
     fn set_up(&mut self) -> Result<(), Violation> {
         for number in 1..=self.plan.robots {
@@ -250,27 +313,29 @@ impl Run<'_> {
 
     /// A process begins, from what it finds on its disk.
     fn start(&mut self, id: RobotId) -> Result<(), Violation> {
-        // Who has lost his disk asks the others first; as long as not all are there, he waits.
-        let lost = self.now > Timestamp(0)
-            && self.robots.get(&id).is_some_and(|robot| robot.disk.is_empty());
-        let all = self.robots.iter().all(|(other, robot)| {
-            *other == id || (robot.node.is_some() && self.network.connected(id, *other))
-        });
         let torn = self.chance.happens(0.5).then(|| self.chance.unit());
         let nonce = self.chance.bits();
         let Some(robot) = self.robots.get_mut(&id) else { return Ok(()) };
         if robot.node.is_some() {
             return Ok(());
         }
-        if robot.disk.full || (lost && !all) {
-            self.after(0.5, Due::Start(id));
-            return Ok(());
-        }
-        let records = robot.disk.found(torn);
-        let records = match records {
+        let records = match robot.disk.found(torn) {
             Ok(records) => records,
             Err(error) => return Err(self.checks.violation(Some(id), error.to_string())),
         };
+        // Who has lost his disk asks the others first; as long as not all are there who know, he waits.
+        let lost = self.now > Timestamp(0) && records.is_empty();
+        let full = robot.disk.full;
+        let all = self.robots.iter().all(|(other, robot)| {
+            *other == id
+                || (robot.node.is_some() && self.network.connected(id, *other))
+                || (robot.node.is_none() && robot.disk.is_empty())
+        });
+        if full || (lost && !all) {
+            self.after(0.5, Due::Start(id));
+            return Ok(());
+        }
+        let Some(robot) = self.robots.get_mut(&id) else { return Ok(()) };
         #[allow(unused_mut, reason = "a mistake may be planted")]
         let mut node = Node::recover(robot.config.clone(), nonce, records);
         #[cfg(feature = "planted")]
@@ -281,12 +346,15 @@ impl Run<'_> {
         if lost {
             // What reached nobody was never said.
             let others = self.robots.iter().filter(|(other, _)| **other != id);
-            let heard = others.filter_map(|(_, robot)| robot.node.as_ref()).flat_map(|node| node.ledger().digests());
-            let heard: BTreeSet<LogId> = heard.map(|digest| digest.log).filter(|log| log.robot == id).collect();
+            let heard =
+                others.filter_map(|(_, robot)| robot.node.as_ref()).flat_map(|node| node.ledger().digests());
+            let heard: BTreeSet<LogId> =
+                heard.map(|digest| digest.log).filter(|log| log.robot == id).collect();
             self.checks.unsaid(id, &heard);
             let others: Vec<RobotId> = self.robots.keys().copied().filter(|other| *other != id).collect();
             for other in others {
-                let status = self.robots.get_mut(&other).and_then(|robot| Some(robot.node.as_mut()?.status()));
+                let status =
+                    self.robots.get_mut(&other).and_then(|robot| Some(robot.node.as_mut()?.status()));
                 if let Some(status) = status {
                     self.act(id, Event::Status(status))?;
                 }
@@ -383,7 +451,6 @@ impl Run<'_> {
                 }
             }
             Command::Publish(entries) => {
-                if std::env::var("DBG").is_ok() { for e in &entries { if matches!(e.body, pleiad_estimation::fact::Body::Vote(_)|pleiad_estimation::fact::Body::Boot(_)) { eprintln!("{} {}: {:?}", self.now, e.id, e.body); } } }
                 for entry in &entries {
                     self.checks.says(entry)?;
                 }
@@ -412,7 +479,6 @@ impl Run<'_> {
     }
 
     fn notice(&mut self, id: RobotId, notice: &Notice) -> Result<(), Violation> {
-        if std::env::var("DBG").is_ok() { eprintln!("{} robot {id}: {notice}", self.now); }
         match notice {
             Notice::Evicted { .. } => {
                 self.outcome.evictions += 1;

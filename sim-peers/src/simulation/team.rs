@@ -91,7 +91,8 @@ impl World {
         let root = TICK_S.sqrt();
         let noise = [0.02, 0.01].map(|sigma| sigma * root * self.chance.normal());
         let motion = Vector3::new(forward * TICK_S, 0.0, rate * TICK_S);
-        let moved = here.compose(&Pose2::exp(motion)).compose(&Pose2::exp(Vector3::new(noise[0], 0.0, noise[1])));
+        let moved =
+            here.compose(&Pose2::exp(motion)).compose(&Pose2::exp(Vector3::new(noise[0], 0.0, noise[1])));
         self.truth.insert(robot, moved);
         samples
     }
@@ -101,7 +102,8 @@ impl World {
         let chance = &mut self.chance;
         match chance.below(3) {
             0 => {
-                let error = Vector3::new(0.05 * chance.normal(), 0.05 * chance.normal(), 0.02 * chance.normal());
+                let error =
+                    Vector3::new(0.05 * chance.normal(), 0.05 * chance.normal(), 0.02 * chance.normal());
                 Relative::Pose(seen.compose(&Pose2::exp(error)))
             }
             1 => Relative::Position {
