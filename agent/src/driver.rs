@@ -117,8 +117,8 @@ pub async fn run<B: Bus + Clone>(
     }
     let folder = config.output.directory.clone();
     let (journal, records) = open_journal(folder.as_ref())?;
-    let fresh = records.is_empty();
     let node = Node::recover(node_config, nonce, records);
+    let fresh = !node.has_lived();
     let (answers_in, answers) = mpsc::channel(64);
     let (parts_in, parts) = mpsc::channel(8);
     let mut agent = Agent {

@@ -153,6 +153,12 @@ impl Node {
         commands
     }
 
+    /// Whether this robot has moved in a life that its journal tells of. If not, peers may know more of its
+    /// boots than it does, and are to be asked before the first odometry.
+    pub fn has_lived(&self) -> bool {
+        self.segments.last().is_some()
+    }
+
     /// Makes a mistake from now on.
     #[cfg(feature = "planted")]
     pub fn plant(&mut self, planted: pleiad_estimation::ledger::Planted) {

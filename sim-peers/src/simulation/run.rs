@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pleiad_agent::{Command, Event, Node, NodeConfig, Notice, journal};
+use pleiad_agent::{Command, Event, Node, NodeConfig, Notice, Record, journal};
 use pleiad_estimation::fact::LogId;
 use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_protocol::{Message, limits};
@@ -324,7 +324,8 @@ impl Run<'_> {
             Err(error) => return Err(self.checks.violation(Some(id), error.to_string())),
         };
         // Who has lost his disk asks the others first; as long as not all are there who know, he waits.
-        let lost = self.now > Timestamp(0) && records.is_empty();
+        let lived = records.iter().any(|record| matches!(record, Record::Sample(_) | Record::Tick { .. }));
+        let lost = self.now > Timestamp(0) && !lived;
         let full = robot.disk.full;
         let all = self.robots.iter().all(|(other, robot)| {
             *other == id
@@ -434,7 +435,7 @@ impl Run<'_> {
                 let Some(robot) = self.robots.get_mut(&id) else { return Ok(false) };
                 if !robot.disk.full {
                     for record in &records {
-                        if let pleiad_agent::Record::Entry(entry) = record
+                        if let Record::Entry(entry) = record
                             && entry.id.robot == id
                         {
                             self.checks.says(entry)?;
