@@ -130,7 +130,7 @@ impl Node {
             Event::Entries(entries) => self.entries(entries),
             Event::Status(status) => self.peer_status(&status),
             Event::InputEnded => self.end_input(),
-            Event::SnapshotPart(peer, part) => self.snapshot_part(peer, part),
+            Event::SnapshotPart(peer, part) => self.snapshot_part(peer, &part),
             Event::Evict(robot) => self.evict(robot),
         }
         self.advance();

@@ -231,14 +231,11 @@ impl Ledger {
         if closing.base.floors.get(&id.robot).is_some_and(|floor| id.boot < *floor) {
             return Some(Refusal::Expired);
         }
-        match self.logs.get(&id.log()) {
-            Some(log) => log.limit.is_some_and(|limit| id.sequence.0 >= limit).then_some(Refusal::Expired),
-            None => {
-                let member =
-                    closing.views.active().any(|term| term.robot == id.robot && id.boot >= term.boot);
-                (!member).then_some(Refusal::NotAMember)
-            }
+        if let Some(log) = self.logs.get(&id.log()) {
+            return log.limit.is_some_and(|limit| id.sequence.0 >= limit).then_some(Refusal::Expired);
         }
+        let member = closing.views.active().any(|term| term.robot == id.robot && id.boot >= term.boot);
+        (!member).then_some(Refusal::NotAMember)
     }
 
     /// From when on what a robot says of itself is taken.

@@ -132,10 +132,11 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 let entries = self.node.serve(&request, limits::ENTRIES);
                 self.publisher.reply(query, &Message::Entries(entries));
             }
-            Ok(Message::SnapshotRequest(request)) => match self.node.serve_snapshot(&request) {
-                Some(part) => self.publisher.reply(query, &Message::SnapshotPart(part)),
-                None => tracing::debug!("asked for a snapshot, but nothing is closed here"),
-            },
+            Ok(Message::SnapshotRequest(request)) => {
+                if let Some(part) = self.node.serve_snapshot(&request) {
+                    self.publisher.reply(query, &Message::SnapshotPart(part));
+                }
+            }
             Ok(other) => tracing::warn!(kind = other.kind(), "not a request for facts"),
             Err(error) => tracing::warn!(%error, "request for facts refused"),
         }

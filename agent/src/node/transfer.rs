@@ -49,7 +49,7 @@ impl Node {
         Some(SnapshotPart { cut, hash, total, offset, bytes: whole.bytes[start..end].to_vec() })
     }
 
-    pub(super) fn snapshot_part(&mut self, peer: RobotId, part: SnapshotPart) {
+    pub(super) fn snapshot_part(&mut self, peer: RobotId, part: &SnapshotPart) {
         if self.ledger.closure().is_none() || part.total > limits::SNAPSHOT_BYTES as u64 {
             return;
         }
@@ -68,7 +68,7 @@ impl Node {
         }
         let bytes = std::mem::take(&mut transfer.received);
         transfer.from = None;
-        if let Err(cause) = self.take_over(peer, &part, &bytes) {
+        if let Err(cause) = self.take_over(peer, part, &bytes) {
             self.notice(Notice::SnapshotRefused { peer, cause });
         }
     }

@@ -337,7 +337,7 @@ impl Ledger {
 
     fn checkpoint_at(&self, closing: &Closing, cut: Timestamp) -> Checkpoint {
         let base = &closing.base;
-        let (positions, limits) = self.positions_at(closing, cut);
+        let (positions, limits) = Self::positions_at(closing, cut);
         let position = |id: &LogId| positions.get(id).copied().unwrap_or(0);
         let mut joint = base.joint.clone();
         let mut counts = base.counts;
@@ -452,11 +452,7 @@ impl Ledger {
 
     /// How far each log is accounted for at a cut, and where logs end: of every member up to its first seal
     /// that reaches the cut; of evicted ones all that is accepted; and the votes that decided who is who.
-    fn positions_at(
-        &self,
-        closing: &Closing,
-        cut: Timestamp,
-    ) -> (BTreeMap<LogId, u64>, BTreeMap<LogId, u64>) {
+    fn positions_at(closing: &Closing, cut: Timestamp) -> (BTreeMap<LogId, u64>, BTreeMap<LogId, u64>) {
         let base = &closing.base;
         let mut positions: BTreeMap<LogId, u64> =
             base.logs.iter().map(|(id, log)| (*id, log.start)).collect();
@@ -507,7 +503,9 @@ impl Ledger {
             };
             needed |= vote.removed.iter().any(ended) || (!vote.added.is_empty() && vote.from < cut);
             if needed {
-                entries.iter().for_each(|id| raise(id.log(), id.sequence.0 + 1));
+                for id in entries {
+                    raise(id.log(), id.sequence.0 + 1);
+                }
             }
         }
         // Votes can lie beyond the first seal that reaches the cut, and more seals before them.
@@ -665,7 +663,7 @@ fn sealed_within(closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
     let accepted =
         |id: &EntryId| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
     let later = closing.seals.get(&robot).into_iter().flatten();
-    let seal = later.filter(|(id, _)| accepted(id)).last().map(|(_, seal)| seal);
+    let seal = later.rev().find(|(id, _)| accepted(id)).map(|(_, seal)| seal);
     let seal = seal.or_else(|| closing.base.seals.get(&robot).map(|(_, seal)| seal));
     seal.map_or(Timestamp::MIN, |seal| closing.closure.floor(seal.observed.min(seal.answered)))
 }

@@ -33,7 +33,7 @@ impl Chance {
     /// One of 0 to `count - 1`.
     pub fn below(&mut self, count: u32) -> u32 {
         #[allow(clippy::cast_possible_truncation, reason = "below 32 bits by construction")]
-        let draw = ((self.0.next_u64() >> 32) * u64::from(count) >> 32) as u32;
+        let draw = (((self.0.next_u64() >> 32) * u64::from(count)) >> 32) as u32;
         draw
     }
 

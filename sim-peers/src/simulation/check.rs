@@ -87,7 +87,7 @@ impl Checks {
         self.said.retain(|id, _| id.robot != robot || last.is_some_and(|last| id.boot <= last));
     }
 
-    pub fn closes(&mut self, robot: RobotId, node: &Node, cut: Timestamp, hash: Fingerprint) {
+    pub fn closes(&mut self, robot: RobotId, cut: Timestamp, hash: Fingerprint) {
         let life = self.lives.get(&robot).copied().unwrap_or(0);
         self.cuts += 1;
         self.closed.entry(cut).or_default().push((robot, life, hash));

@@ -72,6 +72,7 @@ enum Due {
 }
 
 struct Run<'a> {
+    #[cfg_attr(not(feature = "planted"), allow(dead_code, reason = "only mistakes are asked of it"))]
     options: &'a Options,
     plan: Plan,
     now: Timestamp,
@@ -468,7 +469,7 @@ impl Run<'_> {
             Command::Closed { cut, hash, .. } => {
                 let Some(robot) = self.robots.get_mut(&id) else { return Ok(false) };
                 let Some(node) = &robot.node else { return Ok(false) };
-                self.checks.closes(id, node, cut, hash);
+                self.checks.closes(id, cut, hash);
                 if robot.disk.records > MOST_RECORDS {
                     robot.disk.replace(node.compacted());
                 }
