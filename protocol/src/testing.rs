@@ -298,7 +298,7 @@ pub fn message(rng: &mut impl Rng) -> Message {
             hash: Fingerprint(rng.random()),
             total: integer(rng),
             offset: integer(rng),
-            bytes: several(rng, |rng| rng.random()),
+            bytes: several(rng, RngExt::random),
         }),
         7 => Message::ControlRequest(match rng.random_range(0..4) {
             3 => ControlRequest::Evict(RobotId(small(rng))),
