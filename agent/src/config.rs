@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use pleiad_bus::{FaultPlan, FaultsError};
 use pleiad_estimation::fact::{ClockMap, Noise};
 use pleiad_estimation::fold::FoldConfig;
+use pleiad_estimation::ledger::Closure;
 use pleiad_estimation::motion::MotionModel;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use pleiad_protocol::TeamName;
@@ -20,8 +21,8 @@ use checks::{finite, not_negative, positive, value};
 pub use model::RobotCorrection;
 pub use sections::{
     AngleNoise, BusMode, BusSection, ClockSection, ErrorName, FaultsSection, FilterSection, LandmarkRow,
-    LengthNoise, MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection,
-    Strategy, VelocityName, YawName,
+    LedgerSection, LengthNoise, MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise,
+    SensorsSection, Strategy, VelocityName, YawName,
 };
 
 /// Why a configuration cannot be used.
@@ -113,6 +114,9 @@ pub struct AgentConfig {
     /// The network.
     #[serde(default)]
     pub bus: BusSection,
+    /// How long facts are kept.
+    #[serde(default)]
+    pub ledger: LedgerSection,
     /// What is kept on disk.
     #[serde(default)]
     pub output: OutputSection,
@@ -161,6 +165,23 @@ pub struct NodeConfig {
     pub landmarks: BTreeMap<LandmarkId, [f64; 2]>,
     /// Estimates per second of team time.
     pub estimate_rate_hz: f64,
+    /// How the past is closed.
+    pub closing: ClosingConfig,
+}
+
+/// How a team closes its past, and a robot rebases its trajectory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClosingConfig {
+    /// What the team agrees on; `None` to keep everything.
+    pub closure: Option<Closure>,
+    /// How late this robot's own sensors may deliver.
+    pub late_s: f64,
+    /// A robot silent for longer is evicted by the majority; `None` to leave that to operators.
+    pub evict_after_s: Option<f64>,
+    /// The nominal trajectory begins anew that far from its origin, m,
+    pub rebase_m: f64,
+    /// and after that time, s.
+    pub rebase_s: f64,
 }
 
 impl AgentConfig {
@@ -249,6 +270,7 @@ impl AgentConfig {
             clock: self.clock.checked()?,
             landmarks: self.map()?,
             estimate_rate_hz: self.output.estimate_rate_hz,
+            closing: self.ledger.checked()?,
         })
     }
 

@@ -13,13 +13,15 @@ use pleiad_bus::{Bus, BusError, Incoming, Query};
 use pleiad_estimation::RobotId;
 use pleiad_estimation::fact::Entry;
 use pleiad_protocol::keys::{self, Kind};
-use pleiad_protocol::{ControlReply, ControlRequest, FactsRequest, Message, SensorAck, TeamName};
+use pleiad_protocol::{
+    ControlReply, ControlRequest, FactsRequest, Message, SensorAck, SnapshotPart, SnapshotRequest, TeamName,
+};
 use publisher::Publisher;
 use tokio::sync::mpsc;
 use tokio::time::MissedTickBehavior;
 
 use crate::config::{AgentConfig, ConfigError};
-use crate::journal::{Journal, JournalError};
+use crate::journal::{self, Journal, JournalError};
 use crate::node::{Command, Event, Node, Notice, Record, SettledEstimate};
 use crate::results::{self, ResultsError};
 
@@ -54,6 +56,9 @@ pub enum DriverError {
     },
 }
 
+/// A journal is not replaced for less than this many bytes of it that are closed.
+const SMALLEST_COMPACTION_BYTES: u64 = 1 << 20;
+
 /// File name of the journal in the agent's folder.
 pub const JOURNAL: &str = "journal.bin";
 
@@ -71,6 +76,13 @@ struct Agent<'a, B: Bus> {
     /// Peers with an unanswered request.
     asked: BTreeSet<RobotId>,
     answers: mpsc::Sender<(RobotId, Option<Vec<Entry>>)>,
+    /// Peers with an unanswered request for a snapshot.
+    asked_snapshot: BTreeSet<RobotId>,
+    parts: mpsc::Sender<(RobotId, Option<SnapshotPart>)>,
+    /// Settled estimates of what is closed, which the node has forgotten.
+    settled: Vec<SettledEstimate>,
+    /// Size of the journal after it was replaced last.
+    compacted_bytes: u64,
     misattributed: u64,
 }
 
@@ -83,6 +95,7 @@ struct Inputs {
     requests: mpsc::Receiver<Query>,
     control: mpsc::Receiver<Query>,
     answers: mpsc::Receiver<(RobotId, Option<Vec<Entry>>)>,
+    parts: mpsc::Receiver<(RobotId, Option<SnapshotPart>)>,
 }
 
 /// Runs an agent until it is told to shut down, by its control key or by `stop`. Its results are written
@@ -104,9 +117,10 @@ pub async fn run<B: Bus + Clone>(
     }
     let folder = config.output.directory.clone();
     let (journal, records) = open_journal(folder.as_ref())?;
-    let fresh = records.is_empty();
     let node = Node::recover(node_config, nonce, records);
+    let fresh = !node.has_lived();
     let (answers_in, answers) = mpsc::channel(64);
+    let (parts_in, parts) = mpsc::channel(8);
     let mut agent = Agent {
         node,
         journal,
@@ -118,12 +132,16 @@ pub async fn run<B: Bus + Clone>(
         last_batch: None,
         asked: BTreeSet::new(),
         answers: answers_in,
+        asked_snapshot: BTreeSet::new(),
+        parts: parts_in,
+        settled: Vec::new(),
+        compacted_bytes: 0,
         misattributed: 0,
     };
     if fresh {
         agent.ask_for_former_life().await?;
     }
-    let inputs = agent.listen(answers).await?;
+    let inputs = agent.listen(answers, parts).await?;
     let _token = bus.announce(&keys::of(&agent.team, robot, Kind::Alive)).await?;
     tracing::info!(robot = robot.0, fresh, "agent is up");
     let period = Duration::from_secs_f64(config.bus.status_period_s);
@@ -151,6 +169,7 @@ impl<B: Bus + Clone> Agent<'_, B> {
     async fn listen(
         &self,
         answers: mpsc::Receiver<(RobotId, Option<Vec<Entry>>)>,
+        parts: mpsc::Receiver<(RobotId, Option<SnapshotPart>)>,
     ) -> Result<Inputs, DriverError> {
         Ok(Inputs {
             facts: self.bus.subscribe(&keys::all(&self.team, Kind::Fact)).await?,
@@ -160,6 +179,7 @@ impl<B: Bus + Clone> Agent<'_, B> {
             requests: self.bus.serve(&self.key(Kind::Facts)).await?,
             control: self.bus.serve(&self.key(Kind::Control)).await?,
             answers,
+            parts,
         })
     }
 
@@ -218,6 +238,12 @@ impl<B: Bus + Clone> Agent<'_, B> {
                         self.act(Event::Entries(entries)).await?;
                     }
                 }
+                Some((peer, part)) = inputs.parts.recv() => {
+                    self.asked_snapshot.remove(&peer);
+                    if let Some(part) = part {
+                        self.act(Event::SnapshotPart(peer, part)).await?;
+                    }
+                }
                 query = inputs.requests.recv() => {
                     self.request(query.ok_or(DriverError::Closed { what: "requests" })?);
                 }
@@ -250,13 +276,23 @@ impl<B: Bus + Clone> Agent<'_, B> {
     }
 
     async fn execute(&mut self, commands: Vec<Command>) -> Result<(), DriverError> {
+        let robot = self.node.robot();
         for command in commands {
             match command {
                 Command::Journal(records) => {
                     if let Some(journal) = &mut self.journal {
                         journal.append(&records)?;
+                        if journal::must_sync(&records, robot) {
+                            journal.sync()?;
+                        }
                     }
                 }
+                Command::Closed { cut, settled, .. } => {
+                    tracing::debug!(cut = cut.0, "the past is closed");
+                    self.settled.extend(settled);
+                    self.compact()?;
+                }
+                Command::AskSnapshot { peer, request } => self.ask_snapshot(peer, request),
                 Command::Publish(entries) => self.publisher.entries(&entries).await,
                 Command::Estimate(estimate) => {
                     self.online.push(results::online(&estimate));
@@ -267,6 +303,41 @@ impl<B: Bus + Clone> Agent<'_, B> {
             }
         }
         Ok(())
+    }
+
+    /// Replaces the journal once most of it is closed: its size stays within twice of what is needed.
+    fn compact(&mut self) -> Result<(), DriverError> {
+        let Some(journal) = &mut self.journal else { return Ok(()) };
+        if journal.bytes() > 2 * self.compacted_bytes + SMALLEST_COMPACTION_BYTES {
+            journal.replace(&self.node.compacted())?;
+            self.compacted_bytes = journal.bytes();
+        }
+        Ok(())
+    }
+
+    /// Asks for a snapshot, or a part of it, in the background.
+    fn ask_snapshot(&mut self, peer: RobotId, request: SnapshotRequest) {
+        if !self.asked_snapshot.insert(peer) {
+            return;
+        }
+        let (bus, parts) = (self.bus.clone(), self.parts.clone());
+        let key = keys::of(&self.team, peer, Kind::Facts);
+        tokio::spawn(async move {
+            let question = Message::SnapshotRequest(request).encode();
+            let reply = bus.request(&key, question, ASK_TIMEOUT).await;
+            let part = match reply.map(|bytes| Message::decode(&bytes)) {
+                Ok(Ok(Message::SnapshotPart(part))) => Some(part),
+                Ok(other) => {
+                    tracing::debug!(peer = peer.0, ?other, "no snapshot");
+                    None
+                }
+                Err(error) => {
+                    tracing::debug!(peer = peer.0, %error, "a request for a snapshot was not answered");
+                    None
+                }
+            };
+            let _ = parts.send((peer, part)).await;
+        });
     }
 
     /// Asks in the background; one question per peer at a time.
@@ -303,7 +374,9 @@ impl<B: Bus + Clone> Agent<'_, B> {
         if let Some(folder) = &self.folder {
             let (messages, bytes) = self.publisher.sent();
             let summary = results::summary(&mut self.node, messages, bytes);
-            results::write(folder, &self.node.settled(), &self.online, &summary)?;
+            let mut settled = self.settled.clone();
+            settled.extend(self.node.settled());
+            results::write(folder, &settled, &self.online, &summary)?;
         }
         Ok(())
     }
@@ -312,10 +385,14 @@ impl<B: Bus + Clone> Agent<'_, B> {
 /// A notice in the log, at the level of its audience.
 fn report(notice: &Notice) {
     match notice {
-        Notice::Equivocation { .. } | Notice::Fork { .. } | Notice::OwnLogAhead { .. } => {
+        Notice::Equivocation { .. }
+        | Notice::Fork { .. }
+        | Notice::OwnLogAhead { .. }
+        | Notice::Superseded { .. }
+        | Notice::SnapshotDisagreement { .. } => {
             tracing::error!(%notice, "the team contradicts itself");
         }
-        Notice::OdometryGap { .. } => tracing::info!(%notice, "odometry gap"),
+        Notice::OdometryGap { .. } | Notice::SnapshotTaken { .. } => tracing::info!(%notice, "recovery"),
         _ => tracing::warn!(%notice, "degraded"),
     }
 }

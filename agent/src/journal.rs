@@ -2,12 +2,17 @@
 //! that it is found whole or not at all.
 //!
 //! File: the magic `PLEIADJ1`, then frames of `length u32 | crc32 u32 | payload`, little-endian. A payload
-//! is a list of `length u32 | message`, a message being one encoded sample or entry of the protocol.
+//! is a list of `length u32 | message`, a message being one encoded sample or entry of the protocol, or
+//! what only journals hold ([`kept`]).
+
+mod kept;
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use pleiad_estimation::RobotId;
+use pleiad_estimation::fact::{Body, Entry};
 use pleiad_protocol::{Message, ProtocolError, encode_entries, encode_sample};
 
 use crate::node::Record;
@@ -68,6 +73,7 @@ pub struct Journal {
     file: File,
     path: PathBuf,
     unsynced: bool,
+    bytes: u64,
 }
 
 /// What was found in a journal.
@@ -105,7 +111,8 @@ impl Journal {
         if good == 0 {
             file.write_all(MAGIC).map_err(io("write"))?;
         }
-        let journal = Self { file, path: path.to_owned(), unsynced: true };
+        let written = good.max(MAGIC.len() as u64);
+        let journal = Self { file, path: path.to_owned(), unsynced: true, bytes: written };
         Ok((journal, Found { records, torn_bytes }))
     }
 
@@ -128,21 +135,47 @@ impl Journal {
     /// # Errors
     /// [`JournalError::Io`]: nothing that follows from the records may be published then.
     pub fn append(&mut self, records: &[Record]) -> Result<(), JournalError> {
-        let mut frame = vec![0; HEADER_BYTES];
-        for record in records {
-            let message = match record {
-                Record::Sample(sample) => encode_sample(sample),
-                Record::Entry(entry) => encode_entries(std::slice::from_ref(entry)),
-            };
-            frame.extend_from_slice(&length(message.len()));
-            frame.extend_from_slice(&message);
-        }
-        let payload = length(frame.len() - HEADER_BYTES);
-        let checksum = crc32fast::hash(&frame[HEADER_BYTES..]).to_le_bytes();
-        frame[..4].copy_from_slice(&payload);
-        frame[4..8].copy_from_slice(&checksum);
+        let frame = frame(records);
         self.unsynced = true;
+        self.bytes += frame.len() as u64;
         self.file.write_all(&frame).map_err(|cause| self.error("write", cause))
+    }
+
+    /// Bytes written so far, the file's header included.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Replaces the journal by one with these records: the new one is complete on the disk before the old
+    /// one goes, so that one of them is found whatever happens.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`]; the old journal is then still in use.
+    pub fn replace(&mut self, records: &[Record]) -> Result<(), JournalError> {
+        let fresh = self.path.with_extension("new");
+        let path = self.path.clone();
+        let io = |operation| {
+            let path = path.clone();
+            move |cause| JournalError::Io { operation, path, cause }
+        };
+        match std::fs::remove_file(&fresh) {
+            Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => return Err(io("replace")(cause)),
+            _ => {}
+        }
+        let (mut journal, _) = Self::open(&fresh)?;
+        // A few at a time: a frame is found whole or not at all, but need not be everything.
+        for records in records.chunks(256) {
+            journal.append(records)?;
+        }
+        journal.sync()?;
+        std::fs::rename(&fresh, &self.path).map_err(io("replace"))?;
+        if let Some(folder) = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            File::open(folder).and_then(|folder| folder.sync_all()).map_err(io("sync the folder of"))?;
+        }
+        self.file = journal.file;
+        self.bytes = journal.bytes;
+        self.unsynced = false;
+        Ok(())
     }
 
     /// Puts what was appended on the disk itself.
@@ -159,6 +192,45 @@ impl Journal {
     fn error(&self, operation: &'static str, cause: std::io::Error) -> JournalError {
         JournalError::Io { operation, path: self.path.clone(), cause }
     }
+}
+
+/// Whether records have to be on the disk itself before anything that follows from them is published: a boot
+/// said to others and forgotten here would be said again with other words.
+pub fn must_sync(records: &[Record], robot: RobotId) -> bool {
+    let boot = |record: &Record| matches!(record, Record::Entry(Entry { id, body: Body::Boot(_), .. }) if id.robot == robot);
+    records.iter().any(boot)
+}
+
+/// What begins a journal.
+pub fn header() -> Vec<u8> {
+    MAGIC.to_vec()
+}
+
+/// Records as one frame.
+pub fn frame(records: &[Record]) -> Vec<u8> {
+    let mut frame = vec![0; HEADER_BYTES];
+    for record in records {
+        let message = match record {
+            Record::Sample(sample) => encode_sample(sample),
+            Record::Entry(entry) => encode_entries(std::slice::from_ref(entry)),
+            Record::Tick { .. } | Record::Closed(_) | Record::Checkpoint(_) => kept::encode(record),
+        };
+        frame.extend_from_slice(&length(message.len()));
+        frame.extend_from_slice(&message);
+    }
+    let payload = length(frame.len() - HEADER_BYTES);
+    let checksum = crc32fast::hash(&frame[HEADER_BYTES..]).to_le_bytes();
+    frame[..4].copy_from_slice(&payload);
+    frame[4..8].copy_from_slice(&checksum);
+    frame
+}
+
+/// The records in the bytes of a journal, and how many bytes of whole frames there are.
+///
+/// # Errors
+/// [`JournalError`], naming `path`.
+pub fn parse_bytes(bytes: &[u8], path: &Path) -> Result<(Vec<Record>, u64), JournalError> {
+    parse(bytes, path)
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "frames are far below 4 GiB: one event's records")]
@@ -213,6 +285,11 @@ fn parse_payload(payload: &[u8], records: &mut Vec<Record>) -> Result<(), Protoc
     let mut at = 0;
     while let Some(size) = word(payload, at) {
         let message = payload.get(at + 4..at + 4 + size).unwrap_or_default();
+        if kept::is_kept(message) {
+            records.push(kept::decode(message)?);
+            at += 4 + size;
+            continue;
+        }
         match Message::decode(message)? {
             Message::Sample(sample) => records.push(Record::Sample(sample)),
             Message::Entries(entries) => records.extend(entries.into_iter().map(Record::Entry)),

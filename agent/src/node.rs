@@ -1,12 +1,14 @@
 //! The node: one robot's part of the team's filter as a pure state machine. Events in, commands out; no
 //! clock, no file, no network.
 
+mod closing;
 mod commands;
 mod corrector;
 mod intake;
 mod reckoning;
 mod recovery;
 mod segments;
+mod transfer;
 mod views;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -15,6 +17,7 @@ pub use commands::{Command, Event, Notice, Record};
 pub use intake::SampleRefusal;
 pub use views::SettledEstimate;
 
+use closing::Membership;
 use corrector::Corrector;
 use pleiad_estimation::fact::{
     Absolute, Answer, Body, Boot, Continuation, Entry, EntryId, Half, LogId, NoiseRef, Observation, Profile,
@@ -23,7 +26,7 @@ use pleiad_estimation::fact::{
 use pleiad_estimation::ledger::{Insertion, Ledger, Refusal};
 use pleiad_estimation::motion::DeadReckoning;
 use pleiad_estimation::nominal::Outside;
-use pleiad_estimation::sample::Sample;
+use pleiad_estimation::sample::{Reading, Sample, Target};
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, Pose2, RobotId, Sequence, Timestamp};
 use pleiad_protocol::{FactsRequest, LogRange, Status};
@@ -59,6 +62,21 @@ pub struct Node {
     known_boot: Option<BootIndex>,
     /// Logs written under another configuration: known not to be of use, and not asked for.
     foreign: BTreeSet<LogId>,
+    /// Dead reckoning has gone on without a gap since the last boot began in this process.
+    lived: bool,
+    /// The boot before the current one, if its trajectory was only begun anew elsewhere: observations of its
+    /// time still go into its log.
+    rebased: Option<BootIndex>,
+    first_odometry: Option<Timestamp>,
+    /// Boots that began in this process: of their logs nothing can have been lost.
+    lived_boots: BTreeSet<BootIndex>,
+    /// Another agent runs as this robot.
+    superseded: bool,
+    membership: Membership,
+    /// Robots of which entries were refused because of the membership, and were told so.
+    outsiders: BTreeSet<RobotId>,
+    #[cfg(feature = "planted")]
+    planted: Option<pleiad_estimation::ledger::Planted>,
     /// Filled while an event is handled.
     out: Outbox,
 }
@@ -75,7 +93,7 @@ impl Node {
     /// A node that has seen nothing. `nonce` is random and new for every start of the process.
     pub fn new(config: NodeConfig, nonce: u64) -> Self {
         Self {
-            ledger: Ledger::new(config.fold),
+            ledger: Self::empty_ledger(&config),
             dead_reckoning: DeadReckoning::new(config.motion),
             corrector: config
                 .correction
@@ -91,6 +109,15 @@ impl Node {
             input_ended: false,
             known_boot: None,
             foreign: BTreeSet::new(),
+            lived: false,
+            rebased: None,
+            first_odometry: None,
+            lived_boots: BTreeSet::new(),
+            superseded: false,
+            membership: Membership::default(),
+            outsiders: BTreeSet::new(),
+            #[cfg(feature = "planted")]
+            planted: None,
             out: Outbox::default(),
         }
     }
@@ -103,9 +130,19 @@ impl Node {
             Event::Entries(entries) => self.entries(entries),
             Event::Status(status) => self.peer_status(&status),
             Event::InputEnded => self.end_input(),
+            Event::SnapshotPart(peer, part) => self.snapshot_part(peer, &part),
+            Event::Evict(robot) => self.evict(robot),
         }
+        self.advance();
         let Outbox { records, entries, rest } = std::mem::take(&mut self.out);
         let mut commands = Vec::with_capacity(rest.len() + 2);
+        #[cfg(feature = "planted")]
+        if self.planted == Some(pleiad_estimation::ledger::Planted::PublishFirst) {
+            commands.push(Command::Publish(entries));
+            commands.push(Command::Journal(records));
+            commands.extend(rest);
+            return commands;
+        }
         if !records.is_empty() {
             commands.push(Command::Journal(records));
         }
@@ -114,6 +151,19 @@ impl Node {
         }
         commands.extend(rest);
         commands
+    }
+
+    /// Whether this robot has moved in a life that its journal tells of. If not, peers may know more of its
+    /// boots than it does, and are to be asked before the first odometry.
+    pub fn has_lived(&self) -> bool {
+        self.segments.last().is_some()
+    }
+
+    /// Makes a mistake from now on.
+    #[cfg(feature = "planted")]
+    pub fn plant(&mut self, planted: pleiad_estimation::ledger::Planted) {
+        self.planted = Some(planted);
+        self.ledger.plant(planted);
     }
 
     /// This robot.
@@ -161,6 +211,9 @@ impl Node {
                     self.ask_for_gap(id);
                 }
                 Insertion::Duplicate => {}
+                // A robot that does not know yet that its time is closed, or that it was evicted, says much.
+                Insertion::Refused(Refusal::Expired | Refusal::NotAMember)
+                    if !self.outsiders.insert(id.robot) => {}
                 Insertion::Refused(refusal) => {
                     if refusal == Refusal::Configuration {
                         self.foreign.insert(id.log());
@@ -178,6 +231,8 @@ impl Node {
             }
         }
         if added {
+            // Whoever has just learned that he was evicted says nothing any more.
+            self.check_membership();
             self.answer();
         }
     }
@@ -185,6 +240,9 @@ impl Node {
     /// Own entries come back from peers after a journal was lost; those of the current boot can only be
     /// copies of what is held.
     fn take_own(&mut self, id: EntryId) -> bool {
+        if self.is_superseded_by(id) {
+            return false;
+        }
         if self.boot == Some(id.boot) {
             if self.ledger.log(id.log()).is_none_or(|log| log.held() <= id.sequence.0) {
                 self.notice(Notice::OwnLogAhead { id });
@@ -210,6 +268,7 @@ impl Node {
             self.notice(Notice::OtherConfiguration { robot: status.robot, theirs, ours });
             return;
         }
+        self.peer_closure(status);
         let held: BTreeMap<LogId, _> = self.ledger.digests().map(|digest| (digest.log, digest)).collect();
         let mut ranges = Vec::new();
         for theirs in &status.logs {
@@ -223,10 +282,11 @@ impl Node {
             if theirs.held > from {
                 let useless =
                     self.foreign.contains(&theirs.log) || self.ledger.quarantined().contains(&robot);
+                let next = EntryId { robot, boot, sequence: Sequence(from) };
                 if own && self.boot == Some(boot) {
                     let id = EntryId { robot, boot, sequence: Sequence(theirs.held - 1) };
                     self.notice(Notice::OwnLogAhead { id });
-                } else if !useless {
+                } else if !useless && self.ledger.outside(next).is_none() {
                     ranges.push(LogRange { log: theirs.log, from, to: theirs.held });
                 }
             } else if ours.is_some_and(|ours| ours.held == theirs.held && ours.chain != theirs.chain) {
@@ -280,24 +340,39 @@ impl Node {
 
     /// A boot begins at `time`: at the first odometry of this start, and after every gap of the odometry.
     fn begin_boot(&mut self, time: Timestamp) {
-        let index = self.known_boot.map_or(BootIndex(0), |known| BootIndex(known.0 + 1));
+        self.begin_boot_at(time, None);
+    }
+
+    /// A boot begins; `rebased` is where its trajectory begins if it goes on without a gap.
+    fn begin_boot_at(&mut self, time: Timestamp, rebased: Option<Pose2>) {
+        let joined = self.membership.joining.take();
+        let index = self.next_boot().max(joined.unwrap_or_default());
+        let place = self.ledger.settle().member(self.config.robot).map(|member| member.boot);
         let continuation = self.segments.last().map(|(previous, trajectory)| {
             let (end, last) = trajectory.end();
-            let gap_s = time.seconds_since(end);
+            let gap_s = if rebased.is_some() { 0.0 } else { time.seconds_since(end) };
             let [x, y, yaw] = self.config.motion_limits.map(|limit| (limit * gap_s).powi(2));
             Continuation { previous, time: end, last, gap: Symmetric3::diagonal(x, y, yaw) }
         });
+        // Evicted in a boot that the team never heard of: nothing there to carry on from.
+        let continuation = continuation.filter(|from| joined.is_none() || place == Some(from.previous));
         let prior = self.config.prior.filter(|prior| continuation.is_none() && prior.for_boot == index.0);
         // The nominal trajectory begins where the last one ended, so that `odom` has no jump; the first
         // one at the prior, so that it reads as dead reckoning in the map.
         let nominal = match (&continuation, &self.config.prior) {
-            (Some(continuation), _) => continuation.last.nominal,
+            (Some(continuation), _) => rebased.unwrap_or(continuation.last.nominal),
             (None, Some(prior)) => prior.pose,
             (None, None) => Pose2::identity(),
         };
+        let odom = self.odom_of(&Boot { time, nonce: 0, configuration: 0, nominal, continuation });
+        self.lived = true;
+        self.lived_boots.insert(index);
+        self.rebased = None;
+        self.first_odometry = self.first_odometry.or(Some(time));
         self.boot = Some(index);
         self.known_boot = Some(index);
-        self.segments.begin(index, time, nominal, self.config.history_samples);
+        self.segments.begin(index, time, nominal, odom, self.config.history_samples);
+        self.keep_tick();
         let nonce = self.nonce.wrapping_add(u64::from(index.0));
         let configuration = self.ledger.configuration();
         self.say(index, Body::Boot(Boot { time, nonce, configuration, nominal, continuation }));
@@ -318,10 +393,35 @@ impl Node {
         }
     }
 
+    /// `odom_from_nominal` of a boot: the published frame goes on from the boot it carries on.
+    fn odom_of(&self, boot: &Boot) -> Pose2 {
+        boot.continuation.as_ref().map_or_else(Pose2::identity, |from| {
+            let odom = self.segments.odom();
+            // Exactly as it was where the trajectory goes on as it was.
+            if from.last.nominal == boot.nominal {
+                odom
+            } else {
+                odom.compose(&from.last.nominal).compose(&boot.nominal.inverse())
+            }
+        })
+    }
+
     /// Makes a fact of an own observation that the odometry has reached.
     fn observe(&mut self, sample: &Sample) -> Result<(), SampleRefusal> {
-        let boot = self.boot.ok_or(SampleRefusal::BeforeBoot { time: sample.time })?;
-        let observer = self.segments.current(sample.time).map_err(|outside| match outside {
+        let robot = match sample.reading {
+            Reading::Sighting { target: Target::Robot(robot), .. } => Some(robot),
+            _ => None,
+        };
+        self.check_observation(sample.time, robot)?;
+        let current = self.boot.ok_or(SampleRefusal::BeforeBoot { time: sample.time })?;
+        let state = match self.segments.current(sample.time) {
+            Err(Outside::Before) => match self.rebased.and_then(|old| Some((old, self.segments.of(old)?))) {
+                Some((old, trajectory)) => trajectory.at(sample.time).map(|state| (old, state)),
+                None => Err(Outside::Before),
+            },
+            state => state.map(|state| (current, state)),
+        };
+        let (boot, observer) = state.map_err(|outside| match outside {
             Outside::Before => SampleRefusal::BeforeBoot { time: sample.time },
             Outside::Forgotten => SampleRefusal::TooOld { time: sample.time },
             Outside::After => SampleRefusal::AfterLastOdometry { time: sample.time },

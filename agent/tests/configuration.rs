@@ -58,6 +58,8 @@ fn full() -> Table {
         id = 1
         x_m = 1.0
         y_m = 1.0
+        [ledger]
+        evict_after_s = 1.0
         [output]
         directory = 'somewhere'
     ";

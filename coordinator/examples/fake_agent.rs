@@ -59,6 +59,7 @@ fn status(config: &Config, finished: bool) -> Status {
         samples: SampleCounts::default(),
         input_ended: finished,
         drained: finished,
+        closure: None,
     }
 }
 
@@ -124,6 +125,7 @@ fn answer(config: &Config, query: Query, finished: &mut bool) -> Result<bool, Bo
             *finished = true;
             (ControlReply::Accepted, false)
         }
+        ControlRequest::Evict(_) => (ControlReply::Refused("nobody to evict".into()), false),
         ControlRequest::Shutdown if config.mode == Mode::Stubborn => {
             (ControlReply::Refused("planted".into()), false)
         }

@@ -7,7 +7,7 @@ use crate::measurement::{self, Linearization, Unusable};
 use crate::{BootIndex, RobotId, Sequence, Timestamp};
 
 /// Raised whenever the same facts would give other bits.
-pub const FOLD_VERSION: u32 = 1;
+pub const FOLD_VERSION: u32 = 2;
 
 /// Gate on the normalized innovation squared by dimension: chi-square at 99.9 %.
 pub const DEFAULT_GATE: [f64; 3] = [10.828, 13.816, 16.266];
@@ -61,6 +61,12 @@ impl FactKey {
     /// Key of an observation.
     pub fn observation(time: Timestamp, id: EntryId) -> Self {
         Self { time, rank: 1, id }
+    }
+
+    /// Key of an observation counted a second time, which only a planted mistake does.
+    #[cfg(feature = "planted")]
+    pub(crate) fn again(time: Timestamp, id: EntryId) -> Self {
+        Self { time, rank: 2, id }
     }
 
     /// The last key that a fact of `time` or earlier can have.

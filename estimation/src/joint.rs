@@ -36,6 +36,30 @@ pub struct Member {
     placed: bool,
 }
 
+impl Member {
+    /// A robot's part from its numbers, for [`Joint::from_parts`].
+    pub fn new(
+        robot: RobotId,
+        boot: BootIndex,
+        correction: Pose2,
+        nominal: Pose2,
+        folded_noise: Symmetric3,
+    ) -> Self {
+        Self { robot, boot, correction, nominal, folded_noise, placed: true }
+    }
+}
+
+/// A joint taken apart, to be kept or sent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointParts {
+    /// The robots in the order of their rows, and whether they have a place in the map.
+    pub members: Vec<(Member, bool)>,
+    /// Packed lower triangle of the covariance, row after row.
+    pub lower: Vec<f64>,
+    /// How many measurements went into it.
+    pub updates: u64,
+}
+
 /// A robot taking part in an update: its index and the derivative of the prediction with respect to its
 /// invariant error.
 pub(crate) struct Participant {
@@ -108,6 +132,23 @@ impl Joint {
         self.members.iter().position(|member| member.robot == robot && member.placed)
     }
 
+    /// All there is to it, robots without a place included: from the parts a joint can be made again.
+    pub fn parts(&self) -> JointParts {
+        let members = self.members.iter().map(|member| (*member, member.placed));
+        JointParts {
+            members: members.collect(),
+            lower: self.covariance.lower().to_vec(),
+            updates: self.updates,
+        }
+    }
+
+    /// The joint of these parts; `None` if the covariance does not have a row for every member.
+    pub fn from_parts(form: ErrorForm, parts: JointParts) -> Option<Self> {
+        let covariance = JointCovariance::from_lower(3 * parts.members.len(), parts.lower)?;
+        let members = parts.members.into_iter().map(|(member, placed)| Member { placed, ..member });
+        Some(Self { form, members: members.collect(), covariance, updates: parts.updates })
+    }
+
     /// Estimate and covariance of one robot at `state` of its nominal trajectory. The covariance is of
     /// the additive error (position in the map, yaw): what is published.
     pub fn estimate(&self, robot: RobotId, state: &NominalState) -> Option<(Pose2, Symmetric3)> {
@@ -171,20 +212,24 @@ impl Joint {
     fn carry_on(&mut self, row: usize, index: BootIndex, boot: &Boot, continuation: &Continuation) {
         let s = boot.nominal.compose(&continuation.last.nominal.inverse());
         let member = &mut self.members[row];
-        let unfolded = continuation.last.noise_sum.minus(member.folded_noise);
+        let unfolded = unfolded_noise(continuation.last.noise_sum, member.folded_noise);
         // The additive form is linearized at the last event; that pose is the same in the new frame.
         member.nominal = s.compose(&member.nominal);
         member.correction = member.correction.compose(&s.inverse());
         member.folded_noise = unfolded.congruence(&s.adjoint()).scaled(-1.0);
         member.boot = index;
-        let gap_adjoint = boot.nominal.adjoint();
-        let state = NominalState {
-            nominal: boot.nominal,
-            // The gap is motion noise like any other, in the frame of the nominal trajectory.
-            noise_sum: continuation.gap.congruence(&gap_adjoint),
-        };
-        self.propagate(row, &state);
-        self.members[row].folded_noise = Symmetric3::zero();
+        if self.form == ErrorForm::Additive {
+            // Its coordinates do not stay put, so that what is carried is folded here, with the gap.
+            let gap = continuation.gap.congruence(&boot.nominal.adjoint());
+            self.propagate(row, &NominalState { nominal: boot.nominal, noise_sum: gap });
+            self.members[row].folded_noise = Symmetric3::zero();
+        } else {
+            // The gap is motion in the body frame at the pose after it. What is carried is folded with the
+            // next event, as it would have been without the boot.
+            let pose = member.correction.compose(&boot.nominal);
+            member.nominal = boot.nominal;
+            self.covariance.add_diagonal(row, continuation.gap.congruence(&pose.adjoint()));
+        }
     }
 
     /// Folds the process noise a robot has accumulated since its last event.
@@ -262,6 +307,14 @@ impl Joint {
         });
         members.chain(self.covariance.lower().iter().map(|entry| entry.to_bits()))
     }
+}
+
+/// The noise a boot leaves behind that is not folded yet. A robot that lost the end of its journal carries
+/// on from before facts that others hold already; their noise cannot be taken back, and none is added.
+fn unfolded_noise(last: Symmetric3, folded: Symmetric3) -> Symmetric3 {
+    let unfolded = last.minus(folded);
+    let before = [0, 2, 5].into_iter().any(|entry| unfolded.0[entry] < -1e-9 * last.0[entry]);
+    if before { Symmetric3::zero() } else { unfolded }
 }
 
 /// A robot's estimate at `state` of its nominal trajectory, and the covariance of position and yaw, from

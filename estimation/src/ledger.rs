@@ -3,17 +3,30 @@
 //! The estimate is a function of the set of entries in gap-free prefixes: the order of arrival,
 //! duplicates and batches leave no trace in it.
 
+mod checkpoint;
+mod closure;
 mod counts;
 mod history;
 mod log;
+#[cfg(feature = "planted")]
+mod planted;
+pub mod rules;
 mod snapshots;
+mod views;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+pub use checkpoint::{Checkpoint, LogBase};
+use closure::Closing;
+pub use closure::Wish;
 pub use counts::FactCounts;
 pub use history::SettledPoint;
 pub use log::{Log, LogDigest};
+#[cfg(feature = "planted")]
+pub use planted::Planted;
+pub use rules::Closure;
 use snapshots::Snapshots;
+pub use views::{Term, Views};
 
 use crate::fact::{
     Answer, Body, Entry, EntryId, Fingerprint, LogId, Noise, NoiseRef, NominalState, Observation, Quantity,
@@ -66,6 +79,14 @@ pub enum Refusal {
     /// The robot has contradicted itself before.
     #[error("the robot is quarantined: it published two different entries under one identity")]
     Quarantined,
+    /// Its log has ended before, or the cut has passed it.
+    #[error(
+        "beyond what is accepted of its log: it came after the team had closed that time, or was lost by its author"
+    )]
+    Expired,
+    /// Its robot does not belong to the team, or not with this boot.
+    #[error("its robot does not belong to the team any more, or not yet")]
+    NotAMember,
     /// Too many entries wait for a missing one; it will be asked for again.
     #[error("too far ahead of the first missing entry of its log")]
     TooFarAhead,
@@ -95,6 +116,14 @@ pub struct Ledger {
     dirty: Option<FactKey>,
     snapshots: Snapshots,
     refolded: u64,
+    /// Entries and observations refused because their time was closed.
+    expired: usize,
+    /// Present if the team closes its past.
+    closing: Option<Box<Closing>>,
+    /// Entries are held that are not accepted any more.
+    truncated: bool,
+    #[cfg(feature = "planted")]
+    planted: Option<Planted>,
 }
 
 impl Ledger {
@@ -115,7 +144,18 @@ impl Ledger {
             dirty: None,
             snapshots: Snapshots::default(),
             refolded: 0,
+            expired: 0,
+            closing: None,
+            truncated: false,
+            #[cfg(feature = "planted")]
+            planted: None,
         }
+    }
+
+    /// Makes a mistake from now on.
+    #[cfg(feature = "planted")]
+    pub fn plant(&mut self, planted: Planted) {
+        self.planted = Some(planted);
     }
 
     /// Hash of the configuration that decides the bits of the estimate.
@@ -126,10 +166,22 @@ impl Ledger {
     /// Takes an entry, from whomever it came. The estimate follows at the next [`Ledger::settle`].
     pub fn insert(&mut self, entry: Entry) -> Insertion {
         let id = entry.id;
+        if let Some(refusal) = self.outside(id) {
+            // What is over and forgotten comes again and again; it was accounted for.
+            if matches!(entry.body, Body::Observation(_)) && !self.is_forgotten(id.log()) {
+                self.expired += 1;
+            }
+            return Insertion::Refused(refusal);
+        }
         let fingerprint = Fingerprint::of(&entry);
         let log = self.logs.entry(id.log()).or_default();
+        if id.sequence.0 < log.first() {
+            return Insertion::Duplicate;
+        }
         if let Some(held) = log.fingerprint(id.sequence) {
             if held == fingerprint {
+                #[cfg(feature = "planted")]
+                self.count_again(&entry);
                 return Insertion::Duplicate;
             }
             self.equivocation(&entry, fingerprint < held);
@@ -159,12 +211,38 @@ impl Ledger {
             // A buffered entry was checked when it came, except for what the prefix decides.
             if let Some((next, fingerprint)) = next
                 && self.refusal(&next).is_none()
+                && self.outside(next.id).is_none()
             {
                 released += 1;
                 ready.push((next, fingerprint));
             }
         }
+        self.decide();
+        if std::mem::take(&mut self.truncated) {
+            self.rebuild(None);
+        }
         Insertion::Added { released }
+    }
+
+    /// Whether an entry lies where nothing is accepted: a log that has ended, or a robot that is not of the
+    /// team.
+    pub fn outside(&self, id: EntryId) -> Option<Refusal> {
+        let closing = self.closing.as_ref()?;
+        if closing.base.floors.get(&id.robot).is_some_and(|floor| id.boot < *floor) {
+            return Some(Refusal::Expired);
+        }
+        if let Some(log) = self.logs.get(&id.log()) {
+            return log.limit.is_some_and(|limit| id.sequence.0 >= limit).then_some(Refusal::Expired);
+        }
+        let member = closing.views.active().any(|term| term.robot == id.robot && id.boot >= term.boot);
+        (!member).then_some(Refusal::NotAMember)
+    }
+
+    /// From when on what a robot says of itself is taken.
+    fn takes_part(&self, robot: RobotId, time: Timestamp) -> bool {
+        let Some(closing) = &self.closing else { return true };
+        let mut stays = closing.views.terms.iter().filter(|term| term.robot == robot).peekable();
+        stays.peek().is_none() || stays.any(|term| time > term.from)
     }
 
     fn forget_if_empty(&mut self, log: LogId) {
@@ -188,15 +266,46 @@ impl Ledger {
     fn equivocation(&mut self, other: &Entry, replaces: bool) {
         let robot = other.id.robot;
         if replaces {
-            // Nobody is quarantined while what is held already is filed again.
-            let mut rebuilt = Self::new(self.config);
-            for entry in self.logs.values().flat_map(Log::all) {
-                rebuilt.insert(if entry.id == other.id { other.clone() } else { entry.clone() });
-            }
-            rebuilt.quarantined = std::mem::take(&mut self.quarantined);
-            *self = rebuilt;
+            self.rebuild(Some(other));
         }
         self.quarantined.insert(robot);
+    }
+
+    /// Everything that is accepted is filed again, with `other` in the place of the entry of its identity.
+    fn rebuild(&mut self, other: Option<&Entry>) {
+        let mut rebuilt = match &self.closing {
+            None => Self::new(self.config),
+            Some(closing) => {
+                let (closure, base) = (closing.closure.clone(), closing.base.clone());
+                let mut rebuilt = Self::from_checkpoint(self.config, closure, closing.owner, base);
+                if let (Some(fresh), Some(closing)) = (&mut rebuilt.closing, &self.closing) {
+                    fresh.cuts.clone_from(&closing.cuts);
+                }
+                rebuilt
+            }
+        };
+        // Nobody is quarantined while what is held already is filed again. What a cut has accounted for is
+        // kept for peers that have not come as far.
+        for (id, log) in self.logs.iter().filter(|(_, log)| log.limit != Some(0)) {
+            rebuilt.logs.insert(*id, log.before_base());
+        }
+        for log in self.logs.values() {
+            let limit = log.limit.unwrap_or(u64::MAX);
+            for entry in log.all().filter(|entry| (log.base..limit).contains(&entry.id.sequence.0)) {
+                let entry = other.filter(|other| other.id == entry.id).unwrap_or(entry);
+                rebuilt.insert(entry.clone());
+            }
+            let lost = log.all().filter(|entry| entry.id.sequence.0 >= limit);
+            let lost = lost.filter(|entry| matches!(entry.body, Body::Observation(_)));
+            rebuilt.expired += lost.count();
+        }
+        rebuilt.quarantined = std::mem::take(&mut self.quarantined);
+        rebuilt.expired += self.expired;
+        #[cfg(feature = "planted")]
+        {
+            rebuilt.planted = self.planted;
+        }
+        *self = rebuilt;
     }
 
     /// Files an entry that has become part of a prefix.
@@ -208,7 +317,14 @@ impl Ledger {
                 self.profiles.entry((id.log(), profile.index)).or_insert(profile.noise);
             }
             Body::ClockMap(_) => {}
+            Body::Seal(seal) => self.hear_seal(id, seal),
+            Body::Vote(vote) => self.hear_vote(id, vote),
             Body::Observation(observation) => {
+                let closed = self.cut().is_some_and(|cut| observation.time <= cut);
+                if closed || !self.takes_part(id.robot, observation.time) {
+                    self.expired += 1;
+                    return;
+                }
                 if let Quantity::Robot { robot, .. } = observation.quantity {
                     self.pending.insert(id, *observation);
                     self.resolve(id, observation, robot);
@@ -217,6 +333,9 @@ impl Ledger {
                 }
             }
             Body::Half(half) => {
+                if self.is_over(half.observation) {
+                    return;
+                }
                 let slot = self.answers.entry((half.observation, id.robot)).or_insert((id, half.answer));
                 if id < slot.0 {
                     *slot = (id, half.answer);
@@ -234,7 +353,8 @@ impl Ledger {
     }
 
     fn observation(&self, id: EntryId) -> Option<Observation> {
-        match self.logs.get(&id.log())?.entries_from(id.sequence.0).first()?.body {
+        let open = self.closing.as_ref().and_then(|closing| closing.base.open.get(&id));
+        match open.or_else(|| self.logs.get(&id.log())?.entry(id.sequence.0))?.body {
             Body::Observation(observation) => Some(observation),
             _ => None,
         }
@@ -246,7 +366,12 @@ impl Ledger {
 
     /// Files an observation of `robot` by the answer held, if any; a former answer's traces go.
     fn resolve(&mut self, id: EntryId, observation: &Observation, robot: RobotId) {
+        if !self.takes_part(robot, observation.time) {
+            return;
+        }
         let Some((_, answer)) = self.answers.get(&(id, robot)).copied() else { return };
+        #[cfg(feature = "planted")]
+        let answer = self.mistaken(robot, observation.time, answer);
         self.pending.remove(&id);
         self.void.remove(&id);
         match answer {
@@ -282,6 +407,10 @@ impl Ledger {
 
     /// Something changed at `key`: what was folded from there on is stale.
     fn touch(&mut self, key: FactKey) {
+        #[cfg(feature = "planted")]
+        if self.planted == Some(Planted::SkipRewind) {
+            return;
+        }
         if self.folded.is_some_and(|folded| key <= folded) && self.dirty.is_none_or(|dirty| key < dirty) {
             self.dirty = Some(key);
         }
@@ -291,7 +420,8 @@ impl Ledger {
     /// earliest new fact and folds from there.
     pub fn settle(&mut self) -> &Joint {
         if let Some(dirty) = self.dirty.take() {
-            let (joint, key) = self.snapshots.rewind(dirty, self.config.form);
+            let base = self.base_joint();
+            let (joint, key) = self.snapshots.rewind(dirty, &base);
             self.joint = joint;
             self.folded = key;
         }
@@ -334,7 +464,9 @@ impl Ledger {
     pub fn unanswered(&self, robot: RobotId) -> impl Iterator<Item = (EntryId, Timestamp)> + '_ {
         self.pending
             .iter()
-            .filter(move |(_, observation)| Self::names(observation, robot))
+            .filter(move |(_, observation)| {
+                Self::names(observation, robot) && self.takes_part(robot, observation.time)
+            })
             .map(|(id, observation)| (*id, observation.time))
     }
 
@@ -347,6 +479,11 @@ impl Ledger {
             }
         }
         counts
+    }
+
+    /// Observations that wait for the half of `robot`.
+    pub fn pending_of(&self, robot: RobotId) -> usize {
+        if self.pending.is_empty() { 0 } else { self.unanswered(robot).count() }
     }
 
     /// Robots that published two different entries under one identity.

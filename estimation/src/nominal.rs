@@ -45,6 +45,37 @@ impl NominalTrajectory {
         }
     }
 
+    /// Goes on from a state that was kept, with nothing before it.
+    pub fn resume(time: Timestamp, state: NominalState, horizon: usize) -> Self {
+        let ticks = VecDeque::from([Tick { time, state }]);
+        Self { ticks, horizon: horizon.max(2), start: time, distance_m: 0.0 }
+    }
+
+    /// Takes over a state that was computed before; earlier ones than the last are left out.
+    pub fn restore(&mut self, time: Timestamp, state: NominalState) {
+        let (last, before) = self.end();
+        if time > last {
+            let moved = state.nominal.position() - before.nominal.position();
+            self.distance_m += (moved.x * moved.x + moved.y * moved.y).sqrt();
+            self.ticks.push_back(Tick { time, state });
+            if self.ticks.len() > self.horizon {
+                self.ticks.pop_front();
+            }
+        }
+    }
+
+    /// The states kept, by time.
+    pub fn ticks(&self) -> impl Iterator<Item = (Timestamp, NominalState)> + '_ {
+        self.ticks.iter().map(|tick| (tick.time, tick.state))
+    }
+
+    /// Forgets what is not needed to answer for times after `time`.
+    pub fn forget_until(&mut self, time: Timestamp) {
+        while self.ticks.len() > 2 && self.ticks[1].time <= time {
+            self.ticks.pop_front();
+        }
+    }
+
     /// The first instant of the trajectory.
     pub fn start(&self) -> Timestamp {
         self.start

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use pleiad_agent::config::{
-    AgentConfig, AngleNoise, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LengthNoise,
-    MotionSection, OutputSection, PriorSection, RangeBearingNoise, RobotCorrection, SensorsSection, Strategy,
+    AgentConfig, AngleNoise, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LedgerSection,
+    LengthNoise, MotionSection, OutputSection, PriorSection, RangeBearingNoise, RobotCorrection,
+    SensorsSection, Strategy,
 };
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::{RobotId, Timestamp};
@@ -114,6 +115,7 @@ fn configuration(
         clock: ClockSection::default(),
         landmarks: landmarks.to_vec(),
         bus: BusSection::default(),
+        ledger: LedgerSection::default(),
         output: OutputSection::default(),
         faults: None,
     }

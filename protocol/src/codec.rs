@@ -26,6 +26,12 @@ pub fn put_list<T: Serialize>(bytes: &mut Vec<u8>, items: impl ExactSizeIterator
     items.for_each(|item| put(bytes, &item));
 }
 
+/// Appends bytes as they are, after their number.
+pub fn put_bytes(bytes: &mut Vec<u8>, content: &[u8]) {
+    put(bytes, &(content.len() as u64));
+    bytes.extend_from_slice(content);
+}
+
 /// Reads values one after another.
 #[derive(Debug)]
 pub struct Reader<'a> {
@@ -67,6 +73,21 @@ impl<'a> Reader<'a> {
             })?);
         }
         Ok(items)
+    }
+
+    /// Bytes as they are, written by [`put_bytes`].
+    pub fn bytes(&mut self, field: &'static str, limit: usize) -> Result<Vec<u8>, ProtocolError> {
+        let found: u64 = self.take(field)?;
+        let count = usize::try_from(found).ok().filter(|count| *count <= limit);
+        let Some(count) = count else {
+            return Err(ProtocolError::TooMany { field: field.into(), found, limit: limit as u64 });
+        };
+        let Some((bytes, rest)) = self.rest.split_at_checked(count) else {
+            let cause = format!("{found} bytes announced, {} there", self.rest.len());
+            return Err(ProtocolError::Malformed { part: field, cause });
+        };
+        self.rest = rest;
+        Ok(bytes.to_vec())
     }
 
     /// Nothing may follow.

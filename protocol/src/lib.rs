@@ -20,10 +20,13 @@ mod wire;
 
 pub use error::{KeyError, ProtocolError};
 pub use keys::{Key, Kind, SensorKind, TeamName};
-pub use message::{Message, decode_entries, decode_sample, encode_entries, encode_sample};
+pub use message::{
+    Message, decode_checkpoint, decode_entries, decode_sample, encode_checkpoint, encode_entries,
+    encode_sample,
+};
 pub use messages::{
-    ControlReply, ControlRequest, Estimate, FactCounts, FactsRequest, LogRange, LogStatus, SampleCounts,
-    SensorAck, SensorBatch, Status,
+    ClosureStatus, ControlReply, ControlRequest, Estimate, FactCounts, FactsRequest, LogRange, LogStatus,
+    SampleCounts, SensorAck, SensorBatch, SnapshotPart, SnapshotRequest, Status,
 };
 // The names in keys and messages, for crates that must not know estimates.
 pub use pleiad_estimation::{RobotId, Timestamp};

@@ -19,6 +19,12 @@ pub const ROW: usize = 1024;
 pub const RANGES: usize = 4096;
 /// Most samples in a batch.
 pub const SAMPLES: usize = 8192;
+/// Longest part of a snapshot, bytes.
+pub const SNAPSHOT_PART_BYTES: usize = 1 << 19;
+/// Longest snapshot, bytes.
+pub const SNAPSHOT_BYTES: usize = 1 << 28;
+/// Most items in one list of a snapshot.
+pub const SNAPSHOT_ITEMS: usize = 1 << 20;
 /// Longest text, bytes of UTF-8; senders cut it there.
 pub const TEXT_BYTES: usize = 512;
 /// Largest magnitude of a number. No planar robot comes near it, and products of a few such numbers

@@ -1,15 +1,19 @@
 //! All messages, and the way from bytes and to bytes.
 
 use pleiad_estimation::fact::Entry;
+use pleiad_estimation::ledger::Checkpoint;
 use pleiad_estimation::sample::Sample;
 use pleiad_estimation::strategy;
 
 use crate::codec::{self, Reader};
 use crate::error::ProtocolError;
 use crate::limits;
-use crate::messages::{ControlReply, ControlRequest, Estimate, FactsRequest, SensorAck, SensorBatch, Status};
+use crate::messages::{
+    ControlReply, ControlRequest, Estimate, FactsRequest, SensorAck, SensorBatch, SnapshotPart,
+    SnapshotRequest, Status,
+};
 use crate::wire::{WireEntry, WireEstimate, WireSample};
-use crate::wire::{control, status, transfer};
+use crate::wire::{control, snapshot, status, transfer};
 
 /// Anything that travels.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +38,10 @@ pub enum Message {
     ControlReply(ControlReply),
     /// What an approximate strategy says.
     Strategy(strategy::Message),
+    /// Asks for a snapshot.
+    SnapshotRequest(SnapshotRequest),
+    /// A part of one.
+    SnapshotPart(SnapshotPart),
 }
 
 /// The second byte of a message. Numbers are never reused.
@@ -48,6 +56,8 @@ mod kind {
     pub const CONTROL_REQUEST: u8 = 8;
     pub const CONTROL_REPLY: u8 = 9;
     pub const STRATEGY: u8 = 10;
+    pub const SNAPSHOT_REQUEST: u8 = 20;
+    pub const SNAPSHOT_PART: u8 = 21;
 }
 
 impl Message {
@@ -73,6 +83,10 @@ impl Message {
                 sealed(kind::CONTROL_REPLY, |bytes| control::put_reply(bytes, reply))
             }
             Self::Strategy(said) => sealed(kind::STRATEGY, |bytes| crate::strategy::put(bytes, said)),
+            Self::SnapshotRequest(request) => {
+                sealed(kind::SNAPSHOT_REQUEST, |bytes| snapshot::put_request(bytes, *request))
+            }
+            Self::SnapshotPart(part) => sealed(kind::SNAPSHOT_PART, |bytes| snapshot::put_part(bytes, part)),
         }
     }
 
@@ -109,6 +123,8 @@ impl Message {
             kind::CONTROL_REQUEST => Self::ControlRequest(control::take_request(&mut reader)?),
             kind::CONTROL_REPLY => Self::ControlReply(control::take_reply(&mut reader)?),
             kind::STRATEGY => Self::Strategy(crate::strategy::take(&mut reader)?),
+            kind::SNAPSHOT_REQUEST => Self::SnapshotRequest(snapshot::take_request(&mut reader)?),
+            kind::SNAPSHOT_PART => Self::SnapshotPart(snapshot::take_part(&mut reader)?),
             found => return Err(ProtocolError::Kind { found }),
         };
         reader.end()?;
@@ -128,6 +144,8 @@ impl Message {
             Self::ControlRequest(_) => "control request",
             Self::ControlReply(_) => "control reply",
             Self::Strategy(_) => "strategy",
+            Self::SnapshotRequest(_) => "snapshot request",
+            Self::SnapshotPart(_) => "snapshot part",
         }
     }
 
@@ -145,12 +163,14 @@ impl Message {
             kind::CONTROL_REQUEST => "control request",
             kind::CONTROL_REPLY => "control reply",
             kind::STRATEGY => "strategy",
+            kind::SNAPSHOT_REQUEST => "snapshot request",
+            kind::SNAPSHOT_PART => "snapshot part",
             _ => return None,
         })
     }
 
     /// All kinds, in words.
-    pub const KINDS: [&str; 10] = [
+    pub const KINDS: [&str; 12] = [
         "entries",
         "status",
         "facts request",
@@ -161,6 +181,8 @@ impl Message {
         "control request",
         "control reply",
         "strategy",
+        "snapshot request",
+        "snapshot part",
     ];
 }
 
@@ -194,6 +216,19 @@ pub fn decode_sample(bytes: &[u8]) -> Result<Sample, ProtocolError> {
         Message::Sample(sample) => Ok(sample),
         other => Err(ProtocolError::OtherKind { found: other.kind(), expected: "sample" }),
     }
+}
+
+/// A snapshot in bytes, to be sent in parts or kept.
+pub fn encode_checkpoint(checkpoint: &Checkpoint) -> Vec<u8> {
+    snapshot::encode(checkpoint)
+}
+
+/// The snapshot in `bytes`, checked.
+///
+/// # Errors
+/// Whatever is wrong with it first, named.
+pub fn decode_checkpoint(bytes: &[u8]) -> Result<Checkpoint, ProtocolError> {
+    snapshot::decode(bytes)
 }
 
 /// Version and kind, what `body` writes, and the checksum.

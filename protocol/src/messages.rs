@@ -30,6 +30,23 @@ pub struct Status {
     /// Whether nothing is left to do: the input has ended, every observation that names this robot is
     /// answered, and no entry is known to be missing.
     pub drained: bool,
+    /// How far its past is closed; `None` if it keeps everything.
+    pub closure: Option<ClosureStatus>,
+}
+
+/// How far an agent has closed its past, and its place in the team.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ClosureStatus {
+    /// The last cut, and the hash of the snapshot there: equal on all robots.
+    pub cut: Option<(Timestamp, Fingerprint)>,
+    /// Number of changes of the membership it knows of.
+    pub epoch: u32,
+    /// It is not of the team, and asks to be, with its logs from this boot on.
+    pub joining: Option<BootIndex>,
+    /// Logs of which it no longer has the first entries, and the first one it has.
+    pub firsts: Vec<(LogId, u64)>,
+    /// Facts that came, or stayed without an answer, beyond a cut.
+    pub expired: u64,
 }
 
 /// How much of a log is held.
@@ -88,6 +105,30 @@ pub struct LogRange {
     pub to: u64,
 }
 
+/// Asks a peer for its snapshot, in parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SnapshotRequest {
+    /// The cut of the snapshot of which parts are held; any if there are none.
+    pub cut: Option<Timestamp>,
+    /// From this byte on.
+    pub offset: u64,
+}
+
+/// A part of a snapshot.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SnapshotPart {
+    /// The cut.
+    pub cut: Timestamp,
+    /// Hash of the snapshot.
+    pub hash: Fingerprint,
+    /// Its length in bytes.
+    pub total: u64,
+    /// Where this part begins.
+    pub offset: u64,
+    /// The part, at most [`crate::limits::SNAPSHOT_PART_BYTES`].
+    pub bytes: Vec<u8>,
+}
+
 /// A robot's estimate of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
@@ -144,6 +185,8 @@ pub enum ControlRequest {
     Finish,
     /// Leave the team and end the process.
     Shutdown,
+    /// Evict a robot that will not come back, so that the others can close their past without it.
+    Evict(RobotId),
 }
 
 /// The answer of an agent's process.

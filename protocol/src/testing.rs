@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use pleiad_estimation::fact::{
     Absolute, Answer, Body, Boot, ClockMap, Continuation, Entry, EntryId, Fingerprint, Half, LogId, Noise,
-    NoiseRef, NominalState, Observation, Profile, Quantity, VoidReason,
+    NoiseRef, NominalState, Observation, Profile, Quantity, Seal, SealedLog, VoidReason, Vote,
 };
 use pleiad_estimation::geometry::{Matrix3, Vector3};
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
@@ -15,8 +15,8 @@ use pleiad_estimation::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timesta
 use rand::{Rng, RngExt};
 
 use crate::{
-    ControlReply, ControlRequest, Estimate, FactCounts, FactsRequest, LogRange, LogStatus, Message,
-    SampleCounts, SensorAck, SensorBatch, Status, limits,
+    ClosureStatus, ControlReply, ControlRequest, Estimate, FactCounts, FactsRequest, LogRange, LogStatus,
+    Message, SampleCounts, SensorAck, SensorBatch, SnapshotPart, SnapshotRequest, Status, limits,
 };
 
 /// A number, the awkward ones included.
@@ -147,9 +147,29 @@ fn answer(rng: &mut impl Rng) -> Answer {
     }
 }
 
+fn seal(rng: &mut impl Rng) -> Seal {
+    let logs = several(rng, |rng| SealedLog {
+        boot: BootIndex(small(rng)),
+        length: integer(rng),
+        last: rng.random(),
+    });
+    Seal { observed: time(rng), answered: time(rng), closed: time(rng), logs }
+}
+
+fn vote(rng: &mut impl Rng) -> Vote {
+    Vote {
+        epoch: small(rng),
+        removed: several(rng, |rng| RobotId(small(rng))),
+        held: several(rng, |rng| (log(rng), integer(rng))),
+        added: several(rng, |rng| (RobotId(small(rng)), BootIndex(small(rng)))),
+        from: time(rng),
+        operator: rng.random(),
+    }
+}
+
 /// An entry.
 pub fn entry(rng: &mut impl Rng) -> Entry {
-    let body = match rng.random_range(0..5) {
+    let body = match rng.random_range(0..7) {
         0 => Body::Boot(Boot {
             time: time(rng),
             nonce: rng.random(),
@@ -172,6 +192,8 @@ pub fn entry(rng: &mut impl Rng) -> Entry {
             rate_ppb: small(rng).cast_signed(),
         }),
         3 => Body::Observation(observation(rng)),
+        5 => Body::Seal(seal(rng)),
+        6 => Body::Vote(vote(rng)),
         _ => Body::Half(Half { observation: id(rng), answer: answer(rng) }),
     };
     let length = if rng.random() { 0 } else { rng.random_range(0..=limits::EXTENSION_BYTES) };
@@ -220,6 +242,13 @@ pub fn status(rng: &mut impl Rng) -> Status {
         samples: SampleCounts { accepted: integer(rng), refused: integer(rng) },
         input_ended: rng.random(),
         drained: rng.random(),
+        closure: maybe(rng, |rng| ClosureStatus {
+            cut: maybe(rng, |rng| (time(rng), Fingerprint(rng.random()))),
+            epoch: small(rng),
+            joining: maybe(rng, |rng| BootIndex(small(rng))),
+            firsts: several(rng, |rng| (log(rng), integer(rng))),
+            expired: integer(rng),
+        }),
     }
 }
 
@@ -285,8 +314,8 @@ pub fn strategy(rng: &mut impl Rng) -> said::Message {
 
 /// Any message.
 pub fn message(rng: &mut impl Rng) -> Message {
-    match rng.random_range(0..10) {
-        9 => Message::Strategy(strategy(rng)),
+    match rng.random_range(0..12) {
+        11 => Message::Strategy(strategy(rng)),
         0 => Message::Entries(several(rng, |rng| entry(rng))),
         1 => Message::Status(status(rng)),
         2 => Message::FactsRequest(FactsRequest {
@@ -318,7 +347,19 @@ pub fn message(rng: &mut impl Rng) -> Message {
             refused: small(rng),
             first_refusal: maybe(rng, |rng| text(rng)),
         }),
-        7 => Message::ControlRequest(match rng.random_range(0..3) {
+        9 => Message::SnapshotRequest(SnapshotRequest {
+            cut: maybe(rng, |rng| time(rng)),
+            offset: integer(rng),
+        }),
+        10 => Message::SnapshotPart(SnapshotPart {
+            cut: time(rng),
+            hash: Fingerprint(rng.random()),
+            total: integer(rng),
+            offset: integer(rng),
+            bytes: several(rng, RngExt::random),
+        }),
+        7 => Message::ControlRequest(match rng.random_range(0..4) {
+            3 => ControlRequest::Evict(RobotId(small(rng))),
             0 => ControlRequest::Status,
             1 => ControlRequest::Finish,
             _ => ControlRequest::Shutdown,

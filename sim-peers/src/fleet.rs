@@ -178,7 +178,7 @@ impl Fleet {
                     }
                 }
                 // Nothing dies here, so nothing needs to be remembered.
-                Command::Journal(_) => {}
+                Command::Journal(_) | Command::Closed { .. } | Command::AskSnapshot { .. } => {}
             }
         }
     }

@@ -14,6 +14,7 @@ pub mod feed;
 pub mod fleet;
 mod injected;
 pub mod scenario;
+pub mod simulation;
 pub mod strategies;
 pub mod world;
 

@@ -10,7 +10,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
-use pleiad_agent::config::{AgentConfig, BusSection, ClockSection, FilterSection, OutputSection, Strategy};
+use pleiad_agent::config::{
+    AgentConfig, BusSection, ClockSection, FilterSection, LedgerSection, OutputSection, Strategy,
+};
 use pleiad_agent::journal::Journal;
 use pleiad_agent::{Record, driver};
 use pleiad_bus::{Bus, ZenohBus, ZenohConfig};
@@ -132,6 +134,7 @@ impl Stage {
             clock: ClockSection::default(),
             landmarks: Vec::new(),
             bus,
+            ledger: LedgerSection::default(),
             output: OutputSection { directory: Some(self.folder_of(robot)), ..OutputSection::default() },
             faults: None,
         }
@@ -324,7 +327,7 @@ impl Stage {
         let records = Journal::read(&self.folder_of(robot).join(driver::JOURNAL)).unwrap();
         let entry = |record| match record {
             Record::Entry(entry) => Some(entry),
-            Record::Sample(_) => None,
+            _ => None,
         };
         records.into_iter().filter_map(entry).collect()
     }

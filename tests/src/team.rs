@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 use pleiad_agent::NodeConfig;
 use pleiad_agent::config::{
-    AgentConfig, BusSection, ClockSection, FilterSection, LandmarkRow, OutputSection, Strategy,
+    AgentConfig, BusSection, ClockSection, FilterSection, LandmarkRow, LedgerSection, OutputSection, Strategy,
 };
 use pleiad_estimation::fact::Entry;
 use pleiad_estimation::fold::{FoldConfig, fold};
@@ -110,6 +110,7 @@ impl Team {
                 clock: ClockSection::default(),
                 landmarks: landmarks.clone(),
                 bus: BusSection::default(),
+                ledger: LedgerSection::default(),
                 output: OutputSection { estimate_rate_hz: told.estimate_rate_hz, ..OutputSection::default() },
                 faults: None,
             };

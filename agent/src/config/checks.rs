@@ -1,14 +1,18 @@
 //! From what a file says to what a node can rely on: every number in its range.
 
+use std::collections::BTreeSet;
+
 use pleiad_estimation::fact::{ClockMap, Noise};
+use pleiad_estimation::ledger::Closure;
 use pleiad_estimation::motion::{DifferentialDrive, MotionModel, MotionNoise, YawSource};
 use pleiad_estimation::sample::Relative;
-use pleiad_estimation::{Pose2, Timestamp};
+use pleiad_estimation::{Pose2, RobotId, Timestamp};
 
 use super::sections::{
-    AngleNoise, ClockSection, LengthNoise, MotionSection, PriorSection, SensorsSection, YawName,
+    AngleNoise, ClockSection, LedgerSection, LengthNoise, MotionSection, PriorSection, SensorsSection,
+    YawName,
 };
-use super::{ConfigError, Prior};
+use super::{ClosingConfig, ConfigError, Prior};
 
 impl PriorSection {
     pub(super) fn checked(&self) -> Result<Prior, ConfigError> {
@@ -83,6 +87,36 @@ impl ClockSection {
             reference: Timestamp::from_seconds(self.reference_s),
             offset_ns: Timestamp::from_seconds(self.offset_s).0,
             rate_ppb: self.rate_ppb,
+        })
+    }
+}
+
+impl LedgerSection {
+    pub(super) fn checked(&self) -> Result<ClosingConfig, ConfigError> {
+        for (key, number) in [
+            ("ledger.cell_s", self.cell_s),
+            ("ledger.rebase_m", self.rebase_m),
+            ("ledger.rebase_s", self.rebase_s),
+            ("ledger.evict_after_s", self.evict_after_s.unwrap_or(1.0)),
+        ] {
+            positive(key, number)?;
+        }
+        not_negative("ledger.late_s", self.late_s)?;
+        let members: BTreeSet<RobotId> = self.members.iter().copied().map(RobotId).collect();
+        if members.len() < self.members.len() {
+            return Err(ConfigError::Value {
+                key: "ledger.members".to_owned(),
+                found: format!("{:?}", self.members),
+                expected: "every robot once",
+            });
+        }
+        let cell_ns = Timestamp::from_seconds(self.cell_s).0.max(1);
+        Ok(ClosingConfig {
+            closure: (!members.is_empty()).then_some(Closure { members, cell_ns }),
+            late_s: self.late_s,
+            evict_after_s: self.evict_after_s,
+            rebase_m: self.rebase_m,
+            rebase_s: self.rebase_s,
         })
     }
 }

@@ -298,6 +298,38 @@ pub enum BusMode {
     Client,
 }
 
+/// `[ledger]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LedgerSection {
+    /// The robots of the team from the start, the same for all; empty to keep all facts for ever.
+    pub members: Vec<u32>,
+    /// Distance of the times at which the past may be closed, s; the same for all.
+    pub cell_s: f64,
+    /// How late this robot's own sensors may deliver, s: later observations are refused.
+    pub late_s: f64,
+    /// A robot from which nothing was heard for longer is evicted by the majority of the others, s;
+    /// without it only an operator evicts.
+    pub evict_after_s: Option<f64>,
+    /// The nominal trajectory begins anew that far from its origin, m.
+    pub rebase_m: f64,
+    /// And after that time, s.
+    pub rebase_s: f64,
+}
+
+impl Default for LedgerSection {
+    fn default() -> Self {
+        Self {
+            members: Vec::new(),
+            cell_s: 5.0,
+            late_s: 2.0,
+            evict_after_s: None,
+            rebase_m: 300.0,
+            rebase_s: 3600.0,
+        }
+    }
+}
+
 /// `[output]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -138,6 +138,11 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 let entries = self.node.serve(&request, limits::ENTRIES);
                 self.publisher.reply(query, &Message::Entries(entries));
             }
+            Ok(Message::SnapshotRequest(request)) => {
+                if let Some(part) = self.node.serve_snapshot(&request) {
+                    self.publisher.reply(query, &Message::SnapshotPart(part));
+                }
+            }
             Ok(other) => tracing::warn!(kind = other.kind(), "not a request for facts"),
             Err(error) => tracing::warn!(%error, "request for facts refused"),
         }
@@ -157,6 +162,10 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 (ControlReply::Accepted, false)
             }
             ControlRequest::Shutdown => (ControlReply::Accepted, true),
+            ControlRequest::Evict(robot) => {
+                self.act(Event::Evict(robot)).await?;
+                (ControlReply::Accepted, false)
+            }
         };
         if end {
             // Who asked may look for the results as soon as it has its answer.

@@ -1,12 +1,12 @@
 //! What goes into a node and what comes out.
 
-use pleiad_estimation::fact::{Entry, EntryId, LogId};
-use pleiad_estimation::ledger::Refusal;
+use pleiad_estimation::fact::{Entry, EntryId, Fingerprint, LogId, NominalState};
+use pleiad_estimation::ledger::{Checkpoint, Refusal};
 use pleiad_estimation::sample::Sample;
-use pleiad_estimation::{BootIndex, RobotId, Timestamp};
-use pleiad_protocol::{Estimate, FactsRequest, Status};
+use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
+use pleiad_protocol::{Estimate, FactsRequest, SnapshotPart, SnapshotRequest, Status};
 
-use super::SampleRefusal;
+use super::{SampleRefusal, SettledEstimate};
 
 /// Something happened.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +19,10 @@ pub enum Event {
     Status(Status),
     /// There will be no more samples.
     InputEnded,
+    /// A part of a snapshot that was asked for.
+    SnapshotPart(RobotId, SnapshotPart),
+    /// An operator wants a robot that will not come back evicted.
+    Evict(RobotId),
 }
 
 /// Something is to be done, in the order given.
@@ -34,6 +38,23 @@ pub enum Command {
         peer: RobotId,
         /// For what.
         request: FactsRequest,
+    },
+    /// Ask a peer for its snapshot, or for the next part of it.
+    AskSnapshot {
+        /// Whom.
+        peer: RobotId,
+        /// For what.
+        request: SnapshotRequest,
+    },
+    /// The past is closed up to a cut: these estimates will not change any more. The journal may be
+    /// replaced by what [`super::Node::compacted`] gives.
+    Closed {
+        /// The cut.
+        cut: Timestamp,
+        /// Hash of the snapshot there.
+        hash: Fingerprint,
+        /// The settled estimates since the last cut.
+        settled: Vec<SettledEstimate>,
     },
     /// A new estimate of this robot, on the facts held now: the *online* view.
     Estimate(Estimate),
@@ -52,6 +73,22 @@ pub enum Record {
     Sample(Sample),
     /// An entry, own or received.
     Entry(Entry),
+    /// A state of the nominal trajectory, of a robot that closes its past: what was computed once is not
+    /// computed again from samples that may be gone.
+    Tick {
+        /// Of which boot.
+        boot: BootIndex,
+        /// When.
+        time: Timestamp,
+        /// The state.
+        state: NominalState,
+        /// `odom_from_nominal` of this boot.
+        odom: Pose2,
+    },
+    /// The past was closed up to here.
+    Closed(Timestamp),
+    /// A snapshot, of this robot or taken over from a peer: what came before is in it.
+    Checkpoint(Box<Checkpoint>),
 }
 
 /// Something an operator should know.
@@ -111,6 +148,56 @@ pub enum Notice {
         to: Timestamp,
         /// The boot that begins.
         boot: BootIndex,
+    },
+    /// A later life of this robot is heard of while this one runs.
+    #[error(
+        "robot {robot} runs a second time, as boot {boot}: this agent says nothing any more; \
+         stop one of the two and restart the other"
+    )]
+    Superseded {
+        /// This robot.
+        robot: RobotId,
+        /// The boot of the other agent.
+        boot: BootIndex,
+    },
+    /// Two robots closed the same time with different results.
+    #[error(
+        "robot {peer} has closed {cut} with another result ({theirs}, here {ours}): nothing is closed any \
+         more; the two logs contradict each other, restart the team with new journals"
+    )]
+    SnapshotDisagreement {
+        /// Who.
+        peer: RobotId,
+        /// Which cut.
+        cut: Timestamp,
+        /// Its hash.
+        theirs: Fingerprint,
+        /// The hash here.
+        ours: Fingerprint,
+    },
+    /// A snapshot that was asked for cannot be used.
+    #[error("the snapshot of robot {peer} was refused: {cause}")]
+    SnapshotRefused {
+        /// Whose.
+        peer: RobotId,
+        /// Why.
+        cause: String,
+    },
+    /// This robot was evicted.
+    #[error(
+        "this robot was evicted from the team while it was away; it asks to be admitted from boot {boot} on"
+    )]
+    Evicted {
+        /// The boot it will come back with.
+        boot: BootIndex,
+    },
+    /// A peer's snapshot was taken over.
+    #[error("took over the snapshot of robot {peer} at {cut}")]
+    SnapshotTaken {
+        /// Whose.
+        peer: RobotId,
+        /// Its cut.
+        cut: Timestamp,
     },
     /// The robot has no place in the map.
     #[error(

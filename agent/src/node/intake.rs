@@ -48,6 +48,30 @@ pub enum SampleRefusal {
         /// Its stamp.
         time: Timestamp,
     },
+    /// From a time that this robot has promised not to observe in any more.
+    #[error("stamped {time}, which is sealed: it came later than ledger.late_s allows")]
+    Sealed {
+        /// Its stamp.
+        time: Timestamp,
+    },
+    /// Another agent runs as this robot.
+    #[error("stamped {time}, but another agent runs as this robot")]
+    Superseded {
+        /// Its stamp.
+        time: Timestamp,
+    },
+    /// This robot does not belong to the team at present.
+    #[error("stamped {time}, while this robot does not belong to the team")]
+    NotAMember {
+        /// Its stamp.
+        time: Timestamp,
+    },
+    /// The robot that was seen has not answered for long.
+    #[error("robot {robot} has left too many observations of it unanswered")]
+    Unanswered {
+        /// Who was seen.
+        robot: RobotId,
+    },
     /// No noise is configured for the kind.
     #[error("no noise for {kind} in the configuration: add [sensors.{kind}]")]
     NoNoise {
@@ -121,6 +145,9 @@ impl Node {
     }
 
     fn take(&mut self, sample: Sample) -> Result<(), SampleRefusal> {
+        if self.superseded {
+            return Err(SampleRefusal::Superseded { time: sample.time });
+        }
         let sample = self.on_time(sample);
         match sample.reading {
             Reading::Gyro { yaw_rate_rad_s } => {
@@ -163,7 +190,14 @@ impl Node {
             return Err(OdometryRefusal::OutOfOrder { time: sample.time, last }.into());
         }
         let gap = end.filter(|last| sample.time.seconds_since(*last) > self.config.longest_gap_s);
-        if self.boot.is_none() || gap.is_some() {
+        if self.membership.joining.is_some() && !self.may_join(sample.time) {
+            return self.reckon_alone(sample, gap.is_some());
+        }
+        if self.membership.joining.is_some() && self.lived && gap.is_none() {
+            self.reckon(sample)?;
+            self.carry_on_joined();
+        } else if self.boot.is_none() || gap.is_some() {
+            self.check_begin(sample.time)?;
             self.restart(sample)?;
             self.begin_boot(sample.time);
             if let (Some(from), Some(boot)) = (gap, self.boot) {
@@ -180,11 +214,12 @@ impl Node {
         }
         self.answer();
         self.emit_estimate();
+        self.rebase();
         Ok(())
     }
 
     /// An estimate whenever the odometry enters a new cell of the grid of estimate times.
-    fn emit_estimate(&mut self) {
+    pub(super) fn emit_estimate(&mut self) {
         let Some((_, trajectory)) = self.segments.last() else { return };
         let (time, _) = trajectory.end();
         #[allow(clippy::cast_possible_truncation, reason = "seconds times a rate")]

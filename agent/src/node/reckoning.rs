@@ -46,8 +46,19 @@ impl Node {
         };
         if let Some(step) = self.dead_reckoning.odometry(sample)? {
             self.segments.extend(&step);
+            self.keep_tick();
         }
         Ok(())
+    }
+
+    /// Odometry of a former life, of which only the corrector has something to learn.
+    pub(super) fn correct_again(&mut self, sample: Sample) {
+        if let Some(corrector) = &mut self.corrector
+            && corrector.next(&sample, self.segments.last()).is_err()
+        {
+            // The first one after a gap; what is refused twice was refused then.
+            let _ = corrector.begin(&sample);
+        }
     }
 
     /// An observation as a nominal sensor would have made it. `nominal` is dead reckoning at its time.

@@ -1,8 +1,9 @@
 //! A node from the journal of its former life.
 
-use pleiad_estimation::BootIndex;
 use pleiad_estimation::fact::{Body, Boot, Entry};
+use pleiad_estimation::ledger::Checkpoint;
 use pleiad_estimation::sample::{Reading, Sample};
+use pleiad_estimation::{BootIndex, Timestamp};
 
 use super::{Node, Record};
 use crate::config::NodeConfig;
@@ -32,6 +33,17 @@ impl Node {
                     }
                     node.ledger.insert(entry);
                 }
+                Record::Tick { boot, time, state, odom } => {
+                    node.known_boot = node.known_boot.max(Some(boot));
+                    node.segments.restore(boot, time, state, odom, node.config.history_samples);
+                }
+                Record::Closed(cut) => {
+                    if let Some(hash) = node.ledger.close(cut) {
+                        node.remember_hash(cut, hash);
+                        node.segments.forget_until(cut);
+                    }
+                }
+                Record::Checkpoint(checkpoint) => node.resume(*checkpoint),
                 Record::Sample(sample) => {
                     node.relive(sample, &mut announced);
                     let boot = node.segments.last().map(|(boot, _)| boot);
@@ -44,6 +56,20 @@ impl Node {
         node
     }
 
+    /// Goes on from a snapshot in the journal.
+    fn resume(&mut self, checkpoint: Checkpoint) {
+        let own = checkpoint.logs.keys().filter(|log| log.robot == self.config.robot);
+        self.known_boot = self.known_boot.max(own.map(|log| log.boot).max());
+        let (cut, hash) = (checkpoint.time, checkpoint.fingerprint());
+        if cut == Timestamp::MIN {
+            self.ledger = Self::empty_ledger(&self.config);
+        } else {
+            self.ledger.take_over(checkpoint);
+            self.segments.forget_until(cut);
+            self.remember_hash(cut, hash);
+        }
+    }
+
     /// A sample of the journal. An observation became a fact in the same batch of records, or was never
     /// reached by the odometry of its boot.
     fn relive(&mut self, sample: Sample, announced: &mut Option<(BootIndex, Boot)>) {
@@ -52,10 +78,21 @@ impl Node {
             Reading::Gyro { yaw_rate_rad_s } => self.gyro(sample.time, yaw_rate_rad_s),
             Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_) => {
                 // Whoever wrote the journal took the sample: nothing is refused now that was not then.
-                if let Some((index, boot)) = announced.take_if(|(_, boot)| boot.time == sample.time) {
+                if self.ledger.closure().is_some() {
+                    // Its state stands in the journal by itself.
+                    self.correct_again(sample);
+                    return;
+                }
+                let rebased = |boot: &Boot| boot.time.0 == sample.time.0 + 1;
+                if let Some((index, boot)) = announced.take_if(|(_, boot)| rebased(boot)) {
+                    let _ = self.reckon(sample);
+                    let odom = self.odom_of(&boot);
+                    self.segments.begin(index, boot.time, boot.nominal, odom, self.config.history_samples);
+                } else if let Some((index, boot)) = announced.take_if(|(_, boot)| boot.time == sample.time) {
                     let horizon = self.config.history_samples;
                     if self.restart(sample).is_ok() {
-                        self.segments.begin(index, boot.time, boot.nominal, horizon);
+                        let odom = self.odom_of(&boot);
+                        self.segments.begin(index, boot.time, boot.nominal, odom, horizon);
                     }
                 } else {
                     let _ = self.reckon(sample);

@@ -1,12 +1,12 @@
 //! What can be asked of a node: its estimate, its settled history, its status.
 
 use pleiad_estimation::Timestamp;
-use pleiad_estimation::fact::NominalState;
 use pleiad_estimation::ledger::FactCounts;
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, Pose2};
 use pleiad_protocol::{Estimate, LogStatus, SampleCounts, Status};
 
+use super::segments::Segment;
 use super::{Node, SampleRefusal};
 
 /// One point of a settled trajectory: the estimate at a time on all facts up to it.
@@ -32,7 +32,8 @@ impl Node {
         let (time, state) = trajectory.end();
         let joint = self.ledger.settle();
         let member = joint.member(self.config.robot).filter(|member| member.boot == boot)?;
-        let map_from_odom = member.correction;
+        let odom = self.segments.odom();
+        let map_from_odom = member.correction.compose(&odom.inverse());
         let (map_from_robot, covariance) = joint.estimate(self.config.robot, &state)?;
         let [xx, _, yy, _, _, yaw] = covariance.0;
         Some(Estimate {
@@ -40,7 +41,7 @@ impl Node {
             boot,
             time,
             map_from_odom,
-            odom_from_robot: state.nominal,
+            odom_from_robot: odom.compose(&state.nominal),
             map_from_robot,
             covariance,
             sigma: [xx, yy, yaw].map(|variance| variance.max(0.0).sqrt()),
@@ -48,25 +49,41 @@ impl Node {
         })
     }
 
-    /// The settled trajectory on the grid of estimate times.
+    /// The settled trajectory on the grid of estimate times, since the last cut if the team closes its past.
     pub fn settled(&self) -> Vec<SettledEstimate> {
+        self.settled_until(Timestamp::MAX)
+    }
+
+    /// The settled trajectory after the last cut and up to `until`.
+    pub(super) fn settled_until(&self, until: Timestamp) -> Vec<SettledEstimate> {
+        let cut = self.ledger.cut();
         let history = self.ledger.settled_history(self.config.robot);
         let mut estimates = Vec::new();
-        for (boot, trajectory) in self.segments.iter() {
+        for Segment { boot, trajectory, odom } in self.segments.iter() {
             let rate = self.config.estimate_rate_hz;
             #[allow(clippy::cast_possible_truncation, reason = "seconds times a rate")]
             let cells = (
                 (trajectory.start().seconds() * rate).ceil() as i64,
-                (trajectory.end().0.seconds() * rate).floor() as i64,
+                (trajectory.end().0.min(until).seconds() * rate).floor() as i64,
             );
-            for cell in cells.0..=cells.1 {
+            #[allow(clippy::cast_possible_truncation, reason = "seconds times a rate")]
+            let first = cut.map_or(cells.0, |cut| cells.0.max((cut.seconds() * rate).floor() as i64));
+            for cell in first..=cells.1 {
                 let time = Timestamp::from_seconds(cell as f64 / rate);
+                if cut.is_some_and(|cut| time <= cut) || time > until {
+                    continue;
+                }
                 let Ok(state) = trajectory.at(time) else { continue };
                 let known = history.partition_point(|point| point.time <= time);
                 let Some(point) = known.checked_sub(1).map(|last| &history[last]) else { continue };
                 // A boot that began at this very instant has taken over.
-                if point.boot == boot {
-                    estimates.push(settled(time, boot, &state, point.estimate(&state)));
+                if point.boot == *boot {
+                    estimates.push(settled(
+                        time,
+                        *boot,
+                        odom.compose(&state.nominal),
+                        point.estimate(&state),
+                    ));
                 }
             }
         }
@@ -76,7 +93,9 @@ impl Node {
     /// What this node holds and does: its digest for peers, its state for operators.
     pub fn status(&mut self) -> Status {
         let estimate = self.ledger.fingerprint();
-        let logs = self.ledger.digests().filter(|digest| digest.held > 0);
+        // Also logs of which only later entries have come: their author may have lost his journal, and must
+        // not begin them again.
+        let logs = self.ledger.digests().filter(|digest| digest.held > 0 || digest.waiting > 0);
         let logs: Vec<_> = logs
             .map(|digest| LogStatus { log: digest.log, held: digest.held, chain: digest.chain })
             .collect();
@@ -100,6 +119,7 @@ impl Node {
             samples: SampleCounts { accepted: self.counts.accepted, refused: self.counts.refused },
             input_ended: self.input_ended,
             drained: self.drained(),
+            closure: self.closure_status(),
         }
     }
 
@@ -123,15 +143,15 @@ impl Node {
 
     /// Distance travelled by dead reckoning, m.
     pub fn distance_m(&self) -> f64 {
-        self.segments.iter().map(|(_, trajectory)| trajectory.distance_m()).sum()
+        self.segments.distance_m()
     }
 }
 
 fn settled(
     time: Timestamp,
     boot: BootIndex,
-    state: &NominalState,
+    nominal: Pose2,
     (pose, covariance): (Pose2, Symmetric3),
 ) -> SettledEstimate {
-    SettledEstimate { time, boot, pose, covariance, nominal: state.nominal }
+    SettledEstimate { time, boot, pose, covariance, nominal }
 }

@@ -21,6 +21,8 @@ fn the_first_odometry_says_boot_clock_profiles_and_prior_in_this_order() {
             Body::Profile(_) => "profile",
             Body::Observation(_) => "observation",
             Body::Half(_) => "half",
+            Body::Seal(_) => "seal",
+            Body::Vote(_) => "vote",
         })
         .collect();
     let profiles = ["profile"; 7];

@@ -8,6 +8,7 @@ mod support;
 mod anti_entropy;
 mod boots;
 mod clocks;
+mod closing;
 mod dead_reckoning;
 mod exactness;
 mod gaps;

@@ -185,7 +185,10 @@ impl Net {
                 Command::Ask { peer, request } => {
                     self.send(peer, || Message::Ask { from: robot, request: request.clone() });
                 }
-                Command::Estimate(_) | Command::Notice(_) => {}
+                Command::Estimate(_)
+                | Command::Notice(_)
+                | Command::Closed { .. }
+                | Command::AskSnapshot { .. } => {}
             }
         }
         if self.crash.is_some_and(|crash| crash.robot == robot && self.frames(robot) == crash.frames) {

@@ -24,6 +24,7 @@ fn settled() -> Statuses {
         samples: SampleCounts::default(),
         input_ended: true,
         drained: true,
+        closure: None,
     };
     [1, 2, 3].map(|robot| (RobotId(robot), Ok(status(robot)))).into()
 }

@@ -1,5 +1,6 @@
 //! The entries of a log.
 
+use super::{Seal, Vote};
 use crate::sample::Relative;
 use crate::symmetric::Symmetric3;
 use crate::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timestamp};
@@ -61,6 +62,10 @@ pub enum Body {
     Observation(Observation),
     /// The answer to another robot's observation of this one.
     Half(Half),
+    /// What is final.
+    Seal(Seal),
+    /// Who is to belong to the team.
+    Vote(Vote),
 }
 
 /// A robot's nominal trajectory and accumulated process noise at one instant: all that anyone ever

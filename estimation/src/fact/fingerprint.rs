@@ -4,6 +4,7 @@
 use super::entry::{
     Absolute, Answer, Body, Entry, EntryId, Noise, NoiseRef, NominalState, Quantity, VoidReason,
 };
+use super::seal::{Seal, Vote};
 use crate::sample::Relative;
 use crate::{Pose2, Timestamp};
 
@@ -196,6 +197,14 @@ impl Canonical {
                 }
                 self.state(&observation.observer);
             }
+            Body::Seal(seal) => {
+                self.tag(5);
+                self.seal(seal);
+            }
+            Body::Vote(vote) => {
+                self.tag(6);
+                self.vote(vote);
+            }
             Body::Half(half) => {
                 self.tag(4);
                 self.id(half.observation);
@@ -219,5 +228,36 @@ impl Canonical {
         }
         self.word(entry.extension.len() as u64);
         self.0.update(&entry.extension);
+    }
+
+    fn seal(&mut self, seal: &Seal) {
+        for time in [seal.observed, seal.answered, seal.closed] {
+            self.time(time);
+        }
+        self.word(seal.logs.len() as u64);
+        for log in &seal.logs {
+            self.word(u64::from(log.boot.0));
+            self.word(log.length);
+            self.tag(u8::from(log.last));
+        }
+    }
+
+    fn vote(&mut self, vote: &Vote) {
+        self.word(u64::from(vote.epoch));
+        self.word(vote.removed.len() as u64);
+        vote.removed.iter().for_each(|robot| self.word(u64::from(robot.0)));
+        self.word(vote.held.len() as u64);
+        for (log, held) in &vote.held {
+            self.word(u64::from(log.robot.0));
+            self.word(u64::from(log.boot.0));
+            self.word(*held);
+        }
+        self.word(vote.added.len() as u64);
+        for (robot, boot) in &vote.added {
+            self.word(u64::from(robot.0));
+            self.word(u64::from(boot.0));
+        }
+        self.time(vote.from);
+        self.tag(u8::from(vote.operator));
     }
 }

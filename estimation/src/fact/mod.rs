@@ -3,9 +3,11 @@
 
 mod entry;
 mod fingerprint;
+mod seal;
 
 pub use entry::{
     Absolute, Answer, Body, Boot, ClockMap, Continuation, Entry, EntryId, Half, LogId, Noise, NoiseRef,
     NominalState, Observation, Profile, Quantity, VoidReason,
 };
 pub use fingerprint::Fingerprint;
+pub use seal::{Seal, SealedLog, Vote};

@@ -45,6 +45,11 @@ impl Prepared {
 }
 
 impl JointCovariance {
+    /// From a packed lower triangle; `None` if its length does not fit.
+    pub(super) fn from_lower(size: usize, lower: Vec<f64>) -> Option<Self> {
+        (lower.len() == size * (size + 1) / 2).then_some(Self { size, lower })
+    }
+
     /// Number of rows: three times the number of robots.
     pub fn size(&self) -> usize {
         self.size

@@ -1,6 +1,6 @@
 //! How many facts there are of which kind, and what became of them.
 
-use super::Ledger;
+use super::{FactRecord, Ledger};
 use crate::fact::{Absolute, Quantity};
 use crate::fold::{Fact, Outcome};
 
@@ -21,36 +21,56 @@ pub struct FactCounts {
     pub pending: usize,
     /// Answered with a reason why there is no other half.
     pub void: usize,
+    /// Came, or stayed without an answer, beyond a cut; lost for good.
+    pub expired: usize,
+}
+
+impl FactCounts {
+    /// As numbers in the order of the fields.
+    pub fn numbers(&self) -> [usize; 8] {
+        let Self { relative, absolute, used, rejected, skipped, pending, void, expired } = *self;
+        [relative, absolute, used, rejected, skipped, pending, void, expired]
+    }
+
+    /// From numbers in the order of the fields.
+    pub fn from_numbers(numbers: [usize; 8]) -> Self {
+        let [relative, absolute, used, rejected, skipped, pending, void, expired] = numbers;
+        Self { relative, absolute, used, rejected, skipped, pending, void, expired }
+    }
+
+    /// Counts a fact.
+    pub(super) fn add(&mut self, record: &FactRecord) {
+        let Fact::Observation { quantity, .. } = &record.fact else { return };
+        match quantity {
+            Quantity::Robot { .. } => self.relative += 1,
+            Quantity::Landmark { .. } | Quantity::Absolute(Absolute::Position(_) | Absolute::Heading(_)) => {
+                self.absolute += 1;
+            }
+            Quantity::Absolute(Absolute::Pose(_)) => {
+                // A prior is not an observation of the run.
+                if record.residual.is_some_and(|residual| residual.outcome == Outcome::Placed) {
+                    return;
+                }
+                self.absolute += 1;
+            }
+        }
+        match record.residual.map(|residual| residual.outcome) {
+            Some(Outcome::Used) => self.used += 1,
+            Some(Outcome::Rejected { .. }) => self.rejected += 1,
+            Some(Outcome::Skipped(_)) => self.skipped += 1,
+            Some(Outcome::Booted | Outcome::Placed) | None => {}
+        }
+    }
 }
 
 impl Ledger {
-    /// Counts by what became of the facts at the last [`Ledger::settle`].
+    /// Counts by what became of the facts at the last [`Ledger::settle`], those before the cut included.
     pub fn counts(&self) -> FactCounts {
-        let mut counts =
-            FactCounts { pending: self.pending.len(), void: self.void.len(), ..FactCounts::default() };
-        for record in self.facts.values() {
-            let Fact::Observation { quantity, .. } = &record.fact else { continue };
-            match quantity {
-                Quantity::Robot { .. } => counts.relative += 1,
-                Quantity::Landmark { .. }
-                | Quantity::Absolute(Absolute::Position(_) | Absolute::Heading(_)) => {
-                    counts.absolute += 1;
-                }
-                Quantity::Absolute(Absolute::Pose(_)) => {
-                    // A prior is not an observation of the run.
-                    if record.residual.is_some_and(|residual| residual.outcome == Outcome::Placed) {
-                        continue;
-                    }
-                    counts.absolute += 1;
-                }
-            }
-            match record.residual.map(|residual| residual.outcome) {
-                Some(Outcome::Used) => counts.used += 1,
-                Some(Outcome::Rejected { .. }) => counts.rejected += 1,
-                Some(Outcome::Skipped(_)) => counts.skipped += 1,
-                Some(Outcome::Booted | Outcome::Placed) | None => {}
-            }
-        }
+        let mut counts = self.checkpoint().map_or_else(FactCounts::default, |base| base.counts);
+        counts.pending = self.pending.len();
+        counts.void += self.void.len();
+        counts.expired += self.expired;
+        self.facts.values().for_each(|record| counts.add(record));
         counts
     }
 }

@@ -29,14 +29,13 @@ struct SettledView {
 }
 
 impl Ledger {
-    /// Folds all facts once more from the beginning and gives, for one robot, its part of the joint after
+    /// Folds all facts once more from the beginning, or from the last cut, and gives, for one robot, its part of the joint after
     /// each: the *settled* history, in which the estimate at t rests on all facts up to t.
     pub fn settled_history(&self, robot: RobotId) -> Vec<SettledPoint> {
-        let mut joint = Joint::new(self.config.form);
+        let mut joint = self.base_joint();
         let mut points = Vec::new();
-        for (key, record) in &self.facts {
-            fold(&mut joint, &self.config, key, &record.fact);
-            let Some((member, index)) = joint.member(robot).zip(joint.index(robot)) else { continue };
+        let mut add = |joint: &Joint, time| {
+            let Some((member, index)) = joint.member(robot).zip(joint.index(robot)) else { return };
             let view = SettledView {
                 correction: member.correction,
                 block: joint.covariance().block(index, index),
@@ -44,7 +43,14 @@ impl Ledger {
                 nominal: member.nominal,
                 form: self.config.form,
             };
-            points.push(SettledPoint { time: key.time, boot: member.boot, view });
+            points.push(SettledPoint { time, boot: member.boot, view });
+        };
+        if let Some(cut) = self.cut() {
+            add(&joint, cut);
+        }
+        for (key, record) in &self.facts {
+            fold(&mut joint, &self.config, key, &record.fact);
+            add(&joint, key.time);
         }
         points
     }

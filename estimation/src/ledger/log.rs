@@ -2,18 +2,29 @@
 
 use std::collections::BTreeMap;
 
+use super::checkpoint::LogBase;
 use crate::Sequence;
 use crate::fact::{Entry, Fingerprint, LogId};
 
 /// Entries that may wait beyond the first missing one.
 const MOST_WAITING: usize = 4096;
 
-/// A contiguous prefix of one robot's entries during one boot.
+/// A contiguous prefix of one robot's entries during one boot. What a cut has accounted for may be
+/// forgotten from its front.
 #[derive(Clone, Debug, Default)]
 pub struct Log {
+    /// Sequence of the first entry kept.
+    first: u64,
     entries: Vec<Entry>,
     fingerprints: Vec<Fingerprint>,
+    /// Chain over everything held.
     chain: Fingerprint,
+    /// Chain over what came before `first`.
+    first_chain: Fingerprint,
+    /// The log ends there.
+    pub(super) limit: Option<u64>,
+    /// What the last cut has accounted for.
+    pub(super) base: u64,
     waiting: BTreeMap<u64, (Entry, Fingerprint)>,
 }
 
@@ -26,40 +37,81 @@ pub struct LogDigest {
     pub held: u64,
     /// Hash chained over their fingerprints.
     pub chain: Fingerprint,
+    /// The first of them that is still kept.
+    pub first: u64,
+    /// Entries that wait for a missing one.
+    pub waiting: usize,
 }
 
 impl Log {
-    /// Number of entries held without a gap: the next sequence expected.
-    pub fn held(&self) -> u64 {
-        self.entries.len() as u64
+    pub(super) fn from_base(base: &LogBase) -> Self {
+        Self {
+            first: base.start,
+            chain: base.chain,
+            first_chain: base.chain,
+            limit: base.limit,
+            base: base.start,
+            ..Self::default()
+        }
     }
 
-    /// The entries held without a gap.
+    /// Number of entries held without a gap: the next sequence expected.
+    pub fn held(&self) -> u64 {
+        self.first + self.entries.len() as u64
+    }
+
+    /// Sequence of the first entry kept; those before it are accounted for.
+    pub fn first(&self) -> u64 {
+        self.first
+    }
+
+    /// The entries kept, without a gap.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// Those from sequence `from` on.
+    /// Those from sequence `from` on; none if that has been forgotten.
     pub fn entries_from(&self, from: u64) -> &[Entry] {
-        usize::try_from(from).ok().and_then(|from| self.entries.get(from..)).unwrap_or(&[])
+        let skip = from.checked_sub(self.first).and_then(|skip| usize::try_from(skip).ok());
+        skip.and_then(|skip| self.entries.get(skip..)).unwrap_or(&[])
     }
 
-    /// Everything held, what waits for a gap included.
+    /// One entry, if it is kept.
+    pub fn entry(&self, sequence: u64) -> Option<&Entry> {
+        let index = usize::try_from(sequence.checked_sub(self.first)?).ok()?;
+        self.entries.get(index)
+    }
+
+    /// Everything kept, what waits for a gap included.
     pub(super) fn all(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().chain(self.waiting.values().map(|(entry, _)| entry))
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.entries.is_empty() && self.waiting.is_empty()
+        self.held() == 0 && self.waiting.is_empty() && self.limit.is_none()
     }
 
     pub(super) fn digest(&self, log: LogId) -> LogDigest {
-        LogDigest { log, held: self.held(), chain: self.chain }
+        LogDigest {
+            log,
+            held: self.held(),
+            chain: self.chain,
+            first: self.first,
+            waiting: self.waiting.len(),
+        }
     }
 
-    /// Fingerprint of an entry, whether in the prefix or waiting.
+    /// Chain over the entries before `sequence`.
+    pub(super) fn chain_before(&self, sequence: u64) -> Fingerprint {
+        let count = usize::try_from(sequence.saturating_sub(self.first)).unwrap_or(usize::MAX);
+        let start = self.first_chain;
+        self.fingerprints.iter().take(count).fold(start, |chain, print| chain.chained(*print))
+    }
+
+    /// Fingerprint of an entry kept, whether in the prefix or waiting.
     pub(super) fn fingerprint(&self, sequence: Sequence) -> Option<Fingerprint> {
-        let in_prefix = usize::try_from(sequence.0).ok().and_then(|index| self.fingerprints.get(index));
+        let index = sequence.0.checked_sub(self.first).and_then(|index| usize::try_from(index).ok());
+        let in_prefix = index.and_then(|index| self.fingerprints.get(index));
         in_prefix.copied().or_else(|| self.waiting.get(&sequence.0).map(|(_, fingerprint)| *fingerprint))
     }
 
@@ -81,5 +133,45 @@ impl Log {
     /// The waiting entry that continues the prefix.
     pub(super) fn take_buffered(&mut self) -> Option<(Entry, Fingerprint)> {
         self.waiting.remove(&self.held())
+    }
+
+    /// Nothing is accepted from `limit` on; what waited there goes. `true` if entries of the prefix are
+    /// beyond it too.
+    pub(super) fn end_at(&mut self, limit: u64) -> bool {
+        self.limit = Some(self.limit.map_or(limit, |known| known.min(limit)));
+        self.waiting.retain(|sequence, _| *sequence < limit);
+        // What a cut has accounted for stays.
+        self.held() > limit.max(self.base)
+    }
+
+    /// Forgets entries before `sequence`.
+    pub(super) fn forget_before(&mut self, sequence: u64) {
+        self.first_chain = self.chain_before(sequence);
+        let count = usize::try_from(sequence.saturating_sub(self.first)).unwrap_or(usize::MAX);
+        let count = count.min(self.entries.len());
+        self.entries.drain(..count);
+        self.fingerprints.drain(..count);
+        self.first += count as u64;
+    }
+
+    /// This log with what the last cut has accounted for alone.
+    pub(super) fn before_base(&self) -> Self {
+        let count = usize::try_from(self.base.saturating_sub(self.first)).unwrap_or(usize::MAX);
+        let count = count.min(self.entries.len());
+        Self {
+            first: self.first,
+            entries: self.entries[..count].to_vec(),
+            fingerprints: self.fingerprints[..count].to_vec(),
+            chain: self.chain_before(self.base),
+            first_chain: self.first_chain,
+            limit: self.limit,
+            base: self.base,
+            waiting: BTreeMap::new(),
+        }
+    }
+
+    /// How many entries wait for a missing one.
+    pub fn waiting(&self) -> usize {
+        self.waiting.len()
     }
 }

@@ -1,7 +1,7 @@
 //! Copies of the joint at earlier facts, so that a late fact does not cost a fold from the beginning.
 
 use crate::fold::FactKey;
-use crate::joint::{ErrorForm, Joint};
+use crate::joint::Joint;
 
 /// Facts between two fresh snapshots.
 const SPACING: u64 = 16;
@@ -47,16 +47,21 @@ impl Snapshots {
         }
     }
 
-    /// The joint before the first fact at or after `dirty`, as far as a copy reaches; later copies are
-    /// dropped.
-    pub(super) fn rewind(&mut self, dirty: FactKey, form: ErrorForm) -> (Joint, Option<FactKey>) {
+    /// The joint before the first fact at or after `dirty`, as far as a copy reaches, else `base`; later
+    /// copies are dropped.
+    pub(super) fn rewind(&mut self, dirty: FactKey, base: &Joint) -> (Joint, Option<FactKey>) {
         self.kept.retain(|snapshot| snapshot.key < dirty);
         if let Some(snapshot) = self.kept.last() {
             self.folded = snapshot.count;
             (snapshot.joint.clone(), Some(snapshot.key))
         } else {
             self.folded = 0;
-            (Joint::new(form), None)
+            (base.clone(), None)
         }
+    }
+
+    /// Copies at or before a cut are not needed: nothing goes back behind it.
+    pub(super) fn forget_until(&mut self, cut: FactKey) {
+        self.kept.retain(|snapshot| snapshot.key > cut);
     }
 }

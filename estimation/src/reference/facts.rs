@@ -94,7 +94,7 @@ pub fn facts_from_entries(entries: &[Entry]) -> Vec<ReferenceFact> {
             Body::Half(half) => {
                 answers.entry((half.observation, id.robot)).or_insert(half.answer);
             }
-            Body::Boot(_) | Body::ClockMap(_) | Body::Observation(_) => {}
+            Body::Boot(_) | Body::ClockMap(_) | Body::Observation(_) | Body::Seal(_) | Body::Vote(_) => {}
         }
     }
 
@@ -133,7 +133,7 @@ pub fn facts_from_entries(entries: &[Entry]) -> Vec<ReferenceFact> {
                     }),
                 });
             }
-            Body::Profile(_) | Body::ClockMap(_) | Body::Half(_) => {}
+            Body::Profile(_) | Body::ClockMap(_) | Body::Half(_) | Body::Seal(_) | Body::Vote(_) => {}
         }
     }
     facts.sort_by_key(ReferenceFact::order);

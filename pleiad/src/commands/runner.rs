@@ -265,6 +265,8 @@ fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult>
                     own.insert(entry);
                 }
                 Record::Sample(sample) => samples.push(sample),
+                // A run keeps all its facts, so that there is nothing closed in its journals.
+                _ => {}
             }
         }
         samples.sort_by_key(|sample| sample.time);

@@ -1,5 +1,6 @@
 //! Control of an agent's process.
 
+use pleiad_estimation::RobotId;
 use serde::{Deserialize, Serialize};
 
 use super::check;
@@ -13,6 +14,7 @@ enum WireRequest {
     Status,
     Finish,
     Shutdown,
+    Evict(u32),
 }
 
 /// A status follows its variant.
@@ -29,6 +31,7 @@ pub fn put_request(bytes: &mut Vec<u8>, request: ControlRequest) {
         ControlRequest::Status => WireRequest::Status,
         ControlRequest::Finish => WireRequest::Finish,
         ControlRequest::Shutdown => WireRequest::Shutdown,
+        ControlRequest::Evict(robot) => WireRequest::Evict(robot.0),
     };
     codec::put(bytes, &wire);
 }
@@ -39,6 +42,7 @@ pub fn take_request(reader: &mut Reader<'_>) -> Result<ControlRequest, ProtocolE
         WireRequest::Status => ControlRequest::Status,
         WireRequest::Finish => ControlRequest::Finish,
         WireRequest::Shutdown => ControlRequest::Shutdown,
+        WireRequest::Evict(robot) => ControlRequest::Evict(RobotId(robot)),
     })
 }
 

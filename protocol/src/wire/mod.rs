@@ -5,6 +5,7 @@ pub mod control;
 mod entry;
 mod estimate;
 pub mod sample;
+pub mod snapshot;
 pub mod status;
 pub mod transfer;
 

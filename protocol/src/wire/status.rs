@@ -8,7 +8,7 @@ use super::entry::WireLog;
 use crate::codec::{self, Reader};
 use crate::error::ProtocolError;
 use crate::limits;
-use crate::messages::{FactCounts, LogStatus, SampleCounts, Status};
+use crate::messages::{ClosureStatus, FactCounts, LogStatus, SampleCounts, Status};
 
 /// Everything but the logs, which follow as a list.
 #[derive(Serialize, Deserialize)]
@@ -28,6 +28,46 @@ struct WireStatus {
     refused: u64,
     input_ended: bool,
     drained: bool,
+    closure: Option<WireClosure>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct WireClosure {
+    cut: Option<(i64, [u8; 16])>,
+    epoch: u32,
+    joining: Option<u32>,
+    firsts: Vec<(WireLog, u64)>,
+    expired: u64,
+}
+
+impl From<&ClosureStatus> for WireClosure {
+    fn from(closure: &ClosureStatus) -> Self {
+        Self {
+            cut: closure.cut.map(|(time, hash)| (time.0, hash.0)),
+            epoch: closure.epoch,
+            joining: closure.joining.map(|boot| boot.0),
+            firsts: closure.firsts.iter().map(|(log, first)| ((*log).into(), *first)).collect(),
+            expired: closure.expired,
+        }
+    }
+}
+
+impl TryFrom<WireClosure> for ClosureStatus {
+    type Error = ProtocolError;
+
+    fn try_from(wire: WireClosure) -> Result<Self, ProtocolError> {
+        if wire.firsts.len() > limits::LOGS {
+            let (found, limit) = (wire.firsts.len() as u64, limits::LOGS as u64);
+            return Err(ProtocolError::TooMany { field: "status.firsts".into(), found, limit });
+        }
+        Ok(Self {
+            cut: wire.cut.map(|(time_ns, hash)| (Timestamp(time_ns), Fingerprint(hash))),
+            epoch: wire.epoch,
+            joining: wire.joining.map(BootIndex),
+            firsts: wire.firsts.into_iter().map(|(log, first)| (log.into(), first)).collect(),
+            expired: wire.expired,
+        })
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -63,6 +103,7 @@ pub fn put_status(bytes: &mut Vec<u8>, status: &Status) {
         refused: status.samples.refused,
         input_ended: status.input_ended,
         drained: status.drained,
+        closure: status.closure.as_ref().map(WireClosure::from),
     };
     codec::put(bytes, &wire);
     let logs = status.logs.iter();
@@ -94,5 +135,6 @@ pub fn take_status(reader: &mut Reader<'_>) -> Result<Status, ProtocolError> {
         samples: SampleCounts { accepted: wire.accepted, refused: wire.refused },
         input_ended: wire.input_ended,
         drained: wire.drained,
+        closure: wire.closure.map(ClosureStatus::try_from).transpose()?,
     })
 }

@@ -1,0 +1,90 @@
+//! Records that only a journal holds: what never travels. A byte that begins no message, one that says which,
+//! then numbers in little-endian order.
+
+use pleiad_estimation::fact::NominalState;
+use pleiad_estimation::symmetric::Symmetric3;
+use pleiad_estimation::{BootIndex, Pose2, Timestamp};
+use pleiad_protocol::{ProtocolError, decode_checkpoint, encode_checkpoint};
+
+use crate::node::Record;
+
+/// No message begins with it: messages begin with the version of the wire.
+const KEPT: u8 = 255;
+const TICK: u8 = 1;
+const CLOSED: u8 = 2;
+const CHECKPOINT: u8 = 3;
+
+pub(super) fn is_kept(bytes: &[u8]) -> bool {
+    bytes.first() == Some(&KEPT)
+}
+
+pub(super) fn encode(record: &Record) -> Vec<u8> {
+    let mut bytes = vec![KEPT];
+    match record {
+        Record::Tick { boot, time, state, odom } => {
+            bytes.push(TICK);
+            bytes.extend(boot.0.to_le_bytes());
+            bytes.extend(time.0.to_le_bytes());
+            for pose in [&state.nominal, odom] {
+                for number in [pose.x_m(), pose.y_m(), pose.yaw_rad()] {
+                    bytes.extend(number.to_le_bytes());
+                }
+            }
+            state.noise_sum.0.iter().for_each(|entry| bytes.extend(entry.to_le_bytes()));
+        }
+        Record::Closed(cut) => {
+            bytes.push(CLOSED);
+            bytes.extend(cut.0.to_le_bytes());
+        }
+        Record::Checkpoint(checkpoint) => {
+            bytes.push(CHECKPOINT);
+            bytes.extend(encode_checkpoint(checkpoint));
+        }
+        Record::Sample(_) | Record::Entry(_) => {}
+    }
+    bytes
+}
+
+/// Takes numbers from the front.
+struct Numbers<'a>(&'a [u8]);
+
+impl Numbers<'_> {
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], ProtocolError> {
+        let short = ProtocolError::TooShort { bytes: self.0.len() };
+        let (first, rest) = self.0.split_first_chunk::<N>().ok_or(short)?;
+        self.0 = rest;
+        Ok(*first)
+    }
+
+    fn time(&mut self) -> Result<Timestamp, ProtocolError> {
+        Ok(Timestamp(i64::from_le_bytes(self.take()?)))
+    }
+
+    fn number(&mut self) -> Result<f64, ProtocolError> {
+        Ok(f64::from_le_bytes(self.take()?))
+    }
+
+    fn pose(&mut self) -> Result<Pose2, ProtocolError> {
+        Ok(Pose2::new(self.number()?, self.number()?, self.number()?))
+    }
+}
+
+pub(super) fn decode(bytes: &[u8]) -> Result<Record, ProtocolError> {
+    let mut numbers = Numbers(bytes.get(1..).unwrap_or_default());
+    let [kind] = numbers.take()?;
+    Ok(match kind {
+        TICK => {
+            let boot = BootIndex(u32::from_le_bytes(numbers.take()?));
+            let time = numbers.time()?;
+            let (nominal, odom) = (numbers.pose()?, numbers.pose()?);
+            let mut noise_sum = Symmetric3::zero();
+            for entry in &mut noise_sum.0 {
+                *entry = numbers.number()?;
+            }
+            Record::Tick { boot, time, state: NominalState { nominal, noise_sum }, odom }
+        }
+        CLOSED => Record::Closed(numbers.time()?),
+        CHECKPOINT => Record::Checkpoint(Box::new(decode_checkpoint(numbers.0)?)),
+        found => return Err(ProtocolError::Kind { found }),
+    })
+}

@@ -1,0 +1,394 @@
+//! How a node takes part in closing the past: its seals, its votes, the cuts, and what it does when it was
+//! evicted. The rules are in `docs/ledger.md`.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use pleiad_estimation::fact::{Body, EntryId, Fingerprint, LogId, Seal, SealedLog};
+use pleiad_estimation::ledger::{Ledger, Log, Wish, rules};
+use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
+use pleiad_protocol::{ClosureStatus, Status};
+
+use super::transfer::Transfer;
+use super::{Command, Node, Notice, Record, SampleRefusal};
+
+/// Hashes of own snapshots kept to be compared with those of peers.
+const MOST_HASHES: usize = 64;
+/// Observations of one robot that may wait for its answer.
+const MOST_UNANSWERED: usize = 4096;
+
+/// A node's place in a team that closes its past.
+#[derive(Debug, Default)]
+pub(super) struct Membership {
+    /// Not of the team; asks to be, from this boot on.
+    pub joining: Option<BootIndex>,
+    /// Robots an operator wants evicted.
+    evict: BTreeSet<RobotId>,
+    /// Robots that ask to be admitted.
+    applicants: BTreeMap<RobotId, BootIndex>,
+    /// The last snapshots of this node.
+    hashes: BTreeMap<Timestamp, Fingerprint>,
+    /// A peer closed the same time with another result.
+    disagrees: bool,
+    /// Peers that hold no more of this robot's older logs than it does itself.
+    caught_up: BTreeSet<RobotId>,
+    /// A snapshot on its way.
+    pub transfer: Transfer,
+}
+
+impl Node {
+    /// What follows for seals, votes and cuts from whatever has just happened.
+    pub(super) fn advance(&mut self) {
+        if self.ledger.closure().is_none() || self.superseded {
+            return;
+        }
+        // Every round promises, votes or closes something new; a few are always enough.
+        for _ in 0..8 {
+            self.check_membership();
+            let moved = self.vote() | self.seal() | self.close();
+            if !moved {
+                break;
+            }
+        }
+    }
+
+    /// A robot that is not of the team asks to be.
+    pub(super) fn check_membership(&mut self) {
+        let robot = self.config.robot;
+        let Some(views) = self.ledger.views() else { return };
+        if views.is_active(robot) || self.membership.joining.is_some() {
+            return;
+        }
+        let boot = self.next_boot();
+        let evicted = self.boot.take().is_some() || self.segments.last().is_some();
+        self.membership.joining = Some(boot);
+        for sample in std::mem::take(&mut self.waiting) {
+            self.refuse_waiting(SampleRefusal::NotAMember { time: sample.time });
+        }
+        if evicted {
+            // What this robot has closed with its own last words is not what the others close.
+            if let Some(closure) = self.ledger.closure().cloned() {
+                self.ledger = Ledger::closing(self.config.fold, closure, robot);
+                self.out.records.extend(self.base_record());
+            }
+            self.membership.hashes.clear();
+            self.membership.disagrees = false;
+            self.notice(Notice::Evicted { boot });
+        }
+    }
+
+    pub(super) fn next_boot(&self) -> BootIndex {
+        self.known_boot.map_or(BootIndex(0), |known| BootIndex(known.0 + 1))
+    }
+
+    /// Whether odometry at `time` may begin the boot this robot was admitted with.
+    pub(super) fn may_join(&self, time: Timestamp) -> bool {
+        let Some(views) = self.ledger.views() else { return true };
+        let wanted = self.membership.joining.unwrap_or_default();
+        views.active().any(|term| term.robot == self.config.robot && term.boot >= wanted && time > term.from)
+    }
+
+    /// Odometry of a robot that is not of the team: it goes on by itself, so that nothing of its motion is
+    /// unknown when it is admitted.
+    pub(super) fn reckon_alone(
+        &mut self,
+        sample: pleiad_estimation::sample::Sample,
+        gap: bool,
+    ) -> Result<(), SampleRefusal> {
+        if self.lived && !gap {
+            self.reckon(sample)?;
+            self.emit_estimate();
+        } else {
+            self.lived = false;
+        }
+        Ok(())
+    }
+
+    /// Admitted, having gone on alone without a gap.
+    pub(super) fn carry_on_joined(&mut self) {
+        let end = self.segments.last().map(|(_, trajectory)| trajectory.end());
+        if let Some((end, state)) = end {
+            self.begin_boot_at(Timestamp(end.0 + 1), Some(state.nominal));
+        }
+    }
+
+    /// A boot may not begin in a time that is sealed.
+    pub(super) fn check_begin(&self, time: Timestamp) -> Result<(), SampleRefusal> {
+        let sealed = self.ledger.seal_of(self.config.robot).is_some_and(|seal| time <= seal.observed);
+        if sealed { Err(SampleRefusal::Sealed { time }) } else { Ok(()) }
+    }
+
+    /// Whether an own observation at `time` may still be made, of `robot` if it is one.
+    pub(super) fn check_observation(
+        &self,
+        time: Timestamp,
+        robot: Option<RobotId>,
+    ) -> Result<(), SampleRefusal> {
+        self.check_begin(time)?;
+        match robot {
+            Some(robot) if self.ledger.pending_of(robot) >= MOST_UNANSWERED => {
+                Err(SampleRefusal::Unanswered { robot })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn seal(&mut self) -> bool {
+        let (Some(boot), Some(closure)) = (self.boot, self.ledger.closure()) else { return false };
+        let Some((_, trajectory)) = self.segments.last() else { return false };
+        let last = self.ledger.seal_of(self.config.robot);
+        let none = (Timestamp::MIN, Timestamp::MIN);
+        let (observed, answered) = last.map_or(none, |seal| (seal.observed, seal.answered));
+        let late_s = if self.input_ended { 0.0 } else { self.config.closing.late_s };
+        let mut until = closure.floor(trajectory.end().0.plus_seconds(-late_s));
+        // A vote says from when on a newcomer takes part: nothing later is promised before it is decided.
+        if let Some(vote) = self.ledger.views().and_then(|views| views.vote(self.config.robot)) {
+            until = until.min(vote.from);
+        }
+        if until < trajectory.start() {
+            until = Timestamp::MIN;
+        }
+        let until = until.max(observed);
+        let answers = self.ledger.answerable().min(until).max(answered);
+        if (until, answers) == (observed, answered) {
+            return false;
+        }
+        let logs = self.older_logs(boot, until);
+        if !self.knows_its_past() {
+            return false;
+        }
+        if logs.iter().any(|log| log.last && self.rebased == Some(log.boot)) {
+            self.rebased = None;
+        }
+        let closed = self.ledger.cut().unwrap_or(Timestamp::MIN);
+        self.say(boot, Body::Seal(Seal { observed: until, answered: answers, closed, logs }));
+        true
+    }
+
+    /// Whether this robot may say how long its older logs are: before the first seal of this process everyone
+    /// is asked whether it holds more of them. A journal may have lost its end with the power.
+    fn knows_its_past(&self) -> bool {
+        let Some(views) = self.ledger.views() else { return true };
+        let first = self.lived_boots.first().copied().unwrap_or_default();
+        let mut others = views.active().filter(|term| term.robot != self.config.robot);
+        first == BootIndex(0)
+            || self.ledger.sealed_in(self.config.robot).is_some_and(|boot| boot >= first)
+            || others.all(|term| self.membership.caught_up.contains(&term.robot))
+    }
+
+    /// This robot's logs before the current one that have not been said to have ended.
+    fn older_logs(&self, boot: BootIndex, sealed: Timestamp) -> Vec<SealedLog> {
+        let robot = self.config.robot;
+        let ends = |old: BootIndex| {
+            let end = self.segments.of(old).map(|trajectory| trajectory.end().0);
+            self.rebased != Some(old) || end.is_none_or(|end| end <= sealed)
+        };
+        let logs = self.ledger.open_logs(robot).filter(|(id, _)| id.boot < boot);
+        logs.map(|(id, length)| SealedLog { boot: id.boot, length, last: ends(id.boot) }).collect()
+    }
+
+    fn vote(&mut self) -> bool {
+        let Some(boot) = self.boot else { return false };
+        let Some(views) = self.ledger.views() else { return false };
+        self.membership.applicants.retain(|robot, _| !views.is_active(*robot));
+        self.membership.evict.retain(|robot| views.is_active(*robot));
+        let wish = self.wish();
+        let quiet = wish.evict.is_empty() && wish.admit.is_empty() && views.votes.is_empty();
+        if quiet {
+            return false;
+        }
+        match self.ledger.proposal(&wish) {
+            Some(vote) => {
+                self.say(boot, Body::Vote(vote));
+                true
+            }
+            None => false,
+        }
+    }
+
+    fn wish(&self) -> Wish {
+        let mut wish = Wish {
+            evict: self.membership.evict.clone(),
+            absent: BTreeSet::new(),
+            admit: self.membership.applicants.clone(),
+            operator: !self.membership.evict.is_empty(),
+        };
+        let (Some(limit_s), Some(views), Some((_, trajectory))) =
+            (self.config.closing.evict_after_s, self.ledger.views(), self.segments.last())
+        else {
+            return wish;
+        };
+        let mut long_absent = BTreeSet::new();
+        for term in views.active().filter(|term| term.robot != self.config.robot) {
+            let sealed = self.ledger.seal_of(term.robot).map_or(Timestamp::MIN, |seal| seal.observed);
+            let heard = sealed.max(term.from).max(self.first_odometry.unwrap_or(Timestamp::MIN));
+            let silent_s = trajectory.end().0.seconds_since(heard);
+            if silent_s > limit_s {
+                long_absent.insert(term.robot);
+            }
+            if silent_s > limit_s / 2.0 {
+                wish.absent.insert(term.robot);
+            }
+        }
+        let members = views.active().count();
+        if !long_absent.is_empty() && rules::may_decide(members, members - long_absent.len(), false) {
+            wish.evict.extend(long_absent);
+        }
+        wish
+    }
+
+    fn close(&mut self) -> bool {
+        if self.membership.disagrees {
+            return false;
+        }
+        let Some(cut) = self.ledger.closable() else { return false };
+        let settled = self.settled_until(cut);
+        let Some(hash) = self.ledger.close(cut) else { return false };
+        self.remember_hash(cut, hash);
+        self.segments.forget_until(cut);
+        self.out.records.push(Record::Closed(cut));
+        self.out.rest.push(Command::Closed { cut, hash, settled });
+        true
+    }
+
+    pub(super) fn remember_hash(&mut self, cut: Timestamp, hash: Fingerprint) {
+        self.membership.hashes.insert(cut, hash);
+        while self.membership.hashes.len() > MOST_HASHES {
+            self.membership.hashes.pop_first();
+        }
+    }
+
+    pub(super) fn evict(&mut self, robot: RobotId) {
+        if robot != self.config.robot {
+            self.membership.evict.insert(robot);
+        }
+    }
+
+    pub(super) fn closure_status(&self) -> Option<ClosureStatus> {
+        self.ledger.closure()?;
+        let hash = |cut| self.membership.hashes.get(&cut).copied();
+        let firsts = self.ledger.digests().filter(|digest| digest.first > 0);
+        Some(ClosureStatus {
+            cut: self.ledger.cut().and_then(|cut| Some((cut, hash(cut)?))),
+            epoch: self.ledger.views().map_or(0, |views| views.epoch),
+            joining: self.membership.joining,
+            firsts: firsts.map(|digest| (digest.log, digest.first)).collect(),
+            expired: self.ledger.counts().expired as u64,
+        })
+    }
+
+    /// What a peer's status says about cuts and membership.
+    pub(super) fn peer_closure(&mut self, status: &Status) {
+        let Some(theirs) = &status.closure else { return };
+        let peer = status.robot;
+        // Whoever has been evicted without knowing yet may have closed with its own last words.
+        let epoch = self.ledger.views().map_or(0, |views| views.epoch);
+        if let Some((cut, hash)) = theirs.cut
+            && theirs.epoch == epoch
+            && let Some(ours) = self.membership.hashes.get(&cut)
+            && *ours != hash
+            && !self.membership.disagrees
+        {
+            let ours = *ours;
+            self.membership.disagrees = true;
+            self.notice(Notice::SnapshotDisagreement { peer, cut, theirs: hash, ours });
+        }
+        let own = status.logs.iter().filter(|log| log.log.robot == self.config.robot);
+        let more = own.filter(|log| {
+            self.ledger.log(log.log).map_or(0, Log::held) < log.held && !self.ledger.is_forgotten(log.log)
+        });
+        if more.count() == 0 {
+            self.membership.caught_up.insert(peer);
+        } else {
+            self.membership.caught_up.remove(&peer);
+        }
+        match theirs.joining {
+            Some(boot) => {
+                self.membership.applicants.insert(peer, boot);
+            }
+            None => {
+                self.membership.applicants.remove(&peer);
+            }
+        }
+        // What this robot misses is not kept there any more: only the snapshot helps.
+        let held: BTreeMap<LogId, u64> =
+            self.ledger.digests().map(|digest| (digest.log, digest.held)).collect();
+        let missing = theirs.firsts.iter().any(|(log, first)| {
+            held.get(log).copied().unwrap_or(0) < *first && !self.ledger.is_forgotten(*log)
+        }) || self.misses_forgotten(status);
+        let later = theirs.cut.is_some_and(|(cut, _)| self.ledger.cut().is_none_or(|ours| cut > ours));
+        if missing && later {
+            self.ask_for_snapshot(peer);
+        }
+    }
+
+    /// Whether a peer has forgotten a log that is not complete here.
+    fn misses_forgotten(&self, status: &Status) -> bool {
+        let mut lowest: BTreeMap<RobotId, BootIndex> = BTreeMap::new();
+        for log in &status.logs {
+            let slot = lowest.entry(log.log.robot).or_insert(log.log.boot);
+            *slot = (*slot).min(log.log.boot);
+        }
+        lowest.into_iter().any(|(robot, boot)| {
+            boot.0
+                .checked_sub(1)
+                .is_some_and(|before| !self.ledger.is_complete(LogId { robot, boot: BootIndex(before) }))
+        })
+    }
+
+    /// A later life of this robot speaks while this one runs.
+    pub(super) fn is_superseded_by(&mut self, id: EntryId) -> bool {
+        let later = self.boot.is_some_and(|own| id.boot > own);
+        if later && !self.superseded {
+            self.superseded = true;
+            self.notice(Notice::Superseded { robot: self.config.robot, boot: id.boot });
+        }
+        later
+    }
+
+    /// The nominal trajectory begins anew where its numbers would lose precision, within its boot's motion:
+    /// the next boot carries on without a gap, and the published frame without a jump.
+    pub(super) fn rebase(&mut self) {
+        let (Some(_), Some((_, trajectory))) = (self.boot, self.segments.last()) else { return };
+        let (end, state) = trajectory.end();
+        let far = state.nominal.position().norm() > self.config.closing.rebase_m;
+        let old = end.seconds_since(trajectory.start()) > self.config.closing.rebase_s;
+        // A log that may still be extended is not left behind.
+        let begun = trajectory.start() < end && self.rebased.is_none_or(|_| self.ledger.closure().is_none());
+        if (far || old) && begun && !self.input_ended {
+            let previous = self.boot;
+            self.begin_boot_at(Timestamp(end.0 + 1), Some(Pose2::new(0.0, 0.0, state.nominal.yaw_rad())));
+            self.rebased = previous;
+        }
+    }
+
+    /// Keeps the last state of the nominal trajectory, if it will be needed without its samples.
+    pub(super) fn keep_tick(&mut self) {
+        if self.ledger.closure().is_none() {
+            return;
+        }
+        if let Some((boot, trajectory)) = self.segments.last() {
+            let (time, state) = trajectory.end();
+            self.out.records.push(Record::Tick { boot, time, state, odom: self.segments.odom() });
+        }
+    }
+
+    fn base_record(&self) -> Option<Record> {
+        self.ledger.base().map(|base| Record::Checkpoint(Box::new(base.clone())))
+    }
+
+    /// A new journal: what this node would recover from if the old one were thrown away.
+    pub fn compacted(&self) -> Vec<Record> {
+        let mut records: Vec<Record> = self.base_record().into_iter().collect();
+        records.extend(self.ledger.entries_after_cut().cloned().map(Record::Entry));
+        for segment in self.segments.iter() {
+            let (boot, odom) = (segment.boot, segment.odom);
+            records.extend(segment.trajectory.ticks().map(|(time, state)| Record::Tick {
+                boot,
+                time,
+                state,
+                odom,
+            }));
+        }
+        records
+    }
+}

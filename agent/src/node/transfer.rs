@@ -1,0 +1,108 @@
+//! Taking over a peer's snapshot, and giving out one's own, in parts.
+
+use pleiad_estimation::ledger::Ledger;
+use pleiad_estimation::{RobotId, Timestamp};
+use pleiad_protocol::{SnapshotPart, SnapshotRequest, decode_checkpoint, encode_checkpoint, limits};
+
+use super::{Command, Node, Notice, Record};
+
+/// A snapshot on its way, and the one given out last.
+#[derive(Debug, Default)]
+pub(super) struct Transfer {
+    /// The parts received: of whom, of which cut.
+    from: Option<(RobotId, Timestamp)>,
+    received: Vec<u8>,
+    /// Encoded for peers.
+    given: Option<(Timestamp, SnapshotPart)>,
+}
+
+impl Node {
+    pub(super) fn ask_for_snapshot(&mut self, peer: RobotId) {
+        let transfer = &mut self.membership.transfer;
+        // Parts that arrived already are asked for no more, so a lost answer costs one round.
+        let going_on = transfer.from.filter(|(from, _)| *from == peer);
+        if going_on.is_none() {
+            transfer.from = None;
+            transfer.received.clear();
+        }
+        let request =
+            SnapshotRequest { cut: going_on.map(|(_, cut)| cut), offset: transfer.received.len() as u64 };
+        self.out.rest.push(Command::AskSnapshot { peer, request });
+    }
+
+    /// The part of this node's snapshot that a peer asked for; `None` if it has closed nothing yet.
+    pub fn serve_snapshot(&mut self, request: &SnapshotRequest) -> Option<SnapshotPart> {
+        let checkpoint = self.ledger.checkpoint()?;
+        let given = &mut self.membership.transfer.given;
+        // A transfer under way goes on with the snapshot it began with.
+        let under_way = given.as_ref().is_some_and(|(cut, _)| request.cut == Some(*cut));
+        if !under_way && given.as_ref().is_none_or(|(cut, _)| *cut != checkpoint.time) {
+            let bytes = encode_checkpoint(checkpoint);
+            let (cut, hash, total) = (checkpoint.time, checkpoint.fingerprint(), bytes.len() as u64);
+            *given = Some((cut, SnapshotPart { cut, hash, total, offset: 0, bytes }));
+        }
+        let (cut, whole) = given.as_ref()?;
+        let offset = if request.cut.is_none_or(|wanted| wanted == *cut) { request.offset } else { 0 };
+        let start = usize::try_from(offset).ok().filter(|start| *start <= whole.bytes.len())?;
+        let end = (start + limits::SNAPSHOT_PART_BYTES).min(whole.bytes.len());
+        let (cut, hash, total) = (*cut, whole.hash, whole.total);
+        Some(SnapshotPart { cut, hash, total, offset, bytes: whole.bytes[start..end].to_vec() })
+    }
+
+    pub(super) fn snapshot_part(&mut self, peer: RobotId, part: &SnapshotPart) {
+        if self.ledger.closure().is_none() || part.total > limits::SNAPSHOT_BYTES as u64 {
+            return;
+        }
+        let transfer = &mut self.membership.transfer;
+        if transfer.from != Some((peer, part.cut)) {
+            transfer.from = Some((peer, part.cut));
+            transfer.received.clear();
+        }
+        if part.offset != transfer.received.len() as u64 {
+            return;
+        }
+        transfer.received.extend(&part.bytes);
+        if (transfer.received.len() as u64) < part.total && !part.bytes.is_empty() {
+            self.ask_for_snapshot(peer);
+            return;
+        }
+        let bytes = std::mem::take(&mut transfer.received);
+        transfer.from = None;
+        if let Err(cause) = self.take_over(peer, part, &bytes) {
+            self.notice(Notice::SnapshotRefused { peer, cause });
+        }
+    }
+
+    fn take_over(&mut self, peer: RobotId, part: &SnapshotPart, bytes: &[u8]) -> Result<(), String> {
+        let checkpoint = decode_checkpoint(bytes).map_err(|error| error.to_string())?;
+        let hash = checkpoint.fingerprint();
+        if hash != part.hash || checkpoint.time != part.cut {
+            return Err(format!("its hash is {hash}, announced was {}", part.hash));
+        }
+        if checkpoint.configuration != self.ledger.configuration() {
+            return Err("it was made under another configuration".to_owned());
+        }
+        if self.ledger.cut().is_some_and(|cut| checkpoint.time <= cut) {
+            return Ok(());
+        }
+        let own = checkpoint.logs.keys().filter(|log| log.robot == self.config.robot);
+        self.known_boot = self.known_boot.max(own.map(|log| log.boot).max());
+        let cut = checkpoint.time;
+        self.out.records.push(Record::Checkpoint(Box::new(checkpoint.clone())));
+        self.ledger.take_over(checkpoint);
+        self.segments.forget_until(cut);
+        self.remember_hash(cut, hash);
+        self.notice(Notice::SnapshotTaken { peer, cut });
+        Ok(())
+    }
+}
+
+impl Node {
+    /// The ledger of a node, by its configuration.
+    pub(super) fn empty_ledger(config: &crate::config::NodeConfig) -> Ledger {
+        match &config.closing.closure {
+            Some(closure) => Ledger::closing(config.fold, closure.clone(), config.robot),
+            None => Ledger::new(config.fold),
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! A whole team of real nodes under virtual time, over a virtual network and virtual disks, everything from
+//! one seed: what is lost, when who is killed, which disks lose what was not synced. After every event the
+//! invariants of the ledger are checked on the node that handled it; in the end the team must agree, with an
+//! oracle too.
+//!
+//! `docs/ledger.md` says what is checked, and which mistakes were planted to see that it is found.
+
+mod chance;
+mod check;
+mod disk;
+mod network;
+mod plan;
+mod run;
+mod team;
+
+pub use check::Violation;
+pub use plan::Plan;
+#[cfg(feature = "planted")]
+pub use pleiad_estimation::ledger::Planted;
+pub use run::{Hour, Outcome, operate, run};
+
+/// What is simulated besides what the seed decides.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// A mistake in every node.
+    #[cfg(feature = "planted")]
+    pub planted: Option<Planted>,
+    /// Only losses and partitions: no process dies and no disk fails.
+    pub partitions_only: bool,
+    /// Operators and majorities evict robots too.
+    pub evictions: bool,
+}

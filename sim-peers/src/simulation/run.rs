@@ -1,0 +1,598 @@
+//! One schedule from beginning to end.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use pleiad_agent::{Command, Event, Node, NodeConfig, Notice, Record, journal};
+use pleiad_estimation::fact::LogId;
+use pleiad_estimation::{RobotId, Timestamp};
+use pleiad_protocol::{Message, limits};
+
+use super::Options;
+use super::chance::Chance;
+use super::check::{Checks, Violation};
+use super::disk::Disk;
+use super::network::{Network, Weather};
+use super::plan::{Blow, Plan};
+use super::team::{TICK_S, World, config};
+
+/// Between two statuses of a node, s.
+const STATUS_S: f64 = 1.0;
+/// Between two syncs of a journal, s.
+const SYNC_S: f64 = 0.2;
+/// How long the team goes on after everything has healed, s.
+const HEALED_S: f64 = 15.0;
+/// Statuses within which a healed team must agree.
+const ROUNDS: u32 = 60;
+/// Records after which a journal is replaced when the past has been closed.
+const MOST_RECORDS: usize = 200;
+
+/// What a schedule came to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// Robots of the team.
+    pub robots: u32,
+    /// Virtual time, s.
+    pub seconds: f64,
+    /// Messages sent.
+    pub messages: u64,
+    /// Facts used in the end.
+    pub facts: usize,
+    /// Processes that died.
+    pub deaths: u64,
+    /// Cuts closed, by all robots together.
+    pub cuts: u64,
+    /// Snapshots taken over from peers.
+    pub taken_over: u64,
+    /// Evictions a robot learned of.
+    pub evictions: u64,
+    /// Most entries, facts and answers a node kept at a time.
+    pub most_kept: usize,
+    /// Most records in a journal.
+    pub most_records: usize,
+    /// Facts that were lost beyond a cut, and counted.
+    pub expired: usize,
+}
+
+struct Robot {
+    config: NodeConfig,
+    node: Option<Node>,
+    disk: Disk,
+    /// Dies after so many more commands, and comes back after seconds.
+    doomed: Option<(u32, f64)>,
+}
+
+#[derive(Clone, Debug)]
+enum Due {
+    Tick(RobotId),
+    Status(RobotId),
+    Sync(RobotId),
+    Blow(Blow),
+    Start(RobotId),
+    DiskFree(RobotId),
+}
+
+struct Run<'a> {
+    #[cfg_attr(not(feature = "planted"), allow(dead_code, reason = "only mistakes are asked of it"))]
+    options: &'a Options,
+    plan: Plan,
+    now: Timestamp,
+    network: Network,
+    world: World,
+    robots: BTreeMap<RobotId, Robot>,
+    due: BTreeMap<(Timestamp, u64), Due>,
+    count: u64,
+    chance: Chance,
+    checks: Checks,
+    outcome: Outcome,
+}
+
+/// Runs the schedule of a seed.
+///
+/// # Errors
+/// The first invariant that did not hold.
+pub fn run(seed: u64, options: &Options) -> Result<Outcome, Violation> {
+    let plan = Plan::new(seed, options);
+    let world = World::new(seed, plan.robots);
+    let mut run = Run {
+        options,
+        now: Timestamp(0),
+        network: Network::new(Chance::new(seed, 3), plan.weather),
+        world,
+        robots: BTreeMap::new(),
+        due: BTreeMap::new(),
+        count: 0,
+        chance: Chance::new(seed, 4),
+        checks: Checks::new(plan.robots),
+        outcome: Outcome { robots: plan.robots, ..Outcome::default() },
+        plan,
+    };
+    run.set_up()?;
+    run.live()?;
+    run.heal()?;
+    run.agree()?;
+    Ok(run.finish())
+}
+
+/// What a team keeps after so long.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hour {
+    /// Virtual time, h.
+    pub hour: f64,
+    /// Entries, facts and answers in the memory of the robot that keeps most.
+    pub kept: usize,
+    /// Records in the longest journal.
+    pub records: usize,
+    /// Facts used so far.
+    pub facts: usize,
+    /// Cuts closed so far, by all robots together.
+    pub cuts: u64,
+}
+
+/// A team that simply works for hours, on links that lose a tenth; `report` is told what it keeps.
+///
+/// # Errors
+/// As [`run`].
+pub fn operate(robots: u32, hours: f64, mut report: impl FnMut(Hour)) -> Result<(), Violation> {
+    let weather = Weather { loss: 0.1, burst: 5.0, delay_s: 0.01, jitter_s: 0.05, repeated: 0.05 };
+    let options = Options::default();
+    let plan = Plan {
+        robots,
+        seconds: hours * 3600.0,
+        cell_s: Some(5.0),
+        evict_after_s: None,
+        rebase_m: 300.0,
+        weather,
+        blows: Vec::new(),
+    };
+    let mut run = Run {
+        options: &options,
+        now: Timestamp(0),
+        network: Network::new(Chance::new(1, 3), weather),
+        world: World::new(1, robots),
+        robots: BTreeMap::new(),
+        due: BTreeMap::new(),
+        count: 0,
+        chance: Chance::new(1, 4),
+        checks: Checks::new(robots).for_long(),
+        outcome: Outcome::default(),
+        plan,
+    };
+    run.set_up()?;
+    let steps = (hours * 4.0).ceil();
+    let mut step = 0.0;
+    while step < steps {
+        step += 1.0;
+        run.until(Timestamp::from_seconds(hours * 3600.0 * step / steps))?;
+        let nodes = run.robots.values().filter_map(|robot| robot.node.as_ref());
+        let facts = nodes.map(|node| node.ledger().counts().used).max().unwrap_or(0);
+        report(Hour {
+            hour: hours * step / steps,
+            kept: std::mem::take(&mut run.checks.most_kept),
+            records: std::mem::take(&mut run.outcome.most_records),
+            facts,
+            cuts: run.checks.cuts,
+        });
+    }
+    Ok(())
+}
+
+impl Run<'_> {
+    fn set_up(&mut self) -> Result<(), Violation> {
+        for number in 1..=self.plan.robots {
+            let robot = RobotId(number);
+            let config = config(&self.plan, number, &self.world.place(robot))
+                .map_err(|problem| self.checks.violation(Some(robot), problem))?;
+            self.robots.insert(robot, Robot { config, node: None, disk: Disk::default(), doomed: None });
+            self.start(robot)?;
+            let phase = 0.01 * f64::from(number);
+            self.at(phase, Due::Tick(robot));
+            self.at(0.5 + phase, Due::Status(robot));
+            self.at(SYNC_S + phase, Due::Sync(robot));
+        }
+        for (time, blow) in std::mem::take(&mut self.plan.blows) {
+            self.at(time, Due::Blow(blow.clone()));
+            self.plan.blows.push((time, blow));
+        }
+        Ok(())
+    }
+
+    fn at(&mut self, time_s: f64, due: Due) {
+        self.count += 1;
+        self.due.insert((Timestamp::from_seconds(time_s), self.count), due);
+    }
+
+    fn after(&mut self, seconds: f64, due: Due) {
+        self.count += 1;
+        self.due.insert((self.now.plus_seconds(seconds), self.count), due);
+    }
+
+    fn live(&mut self) -> Result<(), Violation> {
+        self.until(Timestamp::from_seconds(self.plan.seconds))
+    }
+
+    /// Everything due up to `end`, in the order of time.
+    fn until(&mut self, end: Timestamp) -> Result<(), Violation> {
+        loop {
+            let message = self.network.next_due();
+            let other = self.due.first_key_value().map(|((time, _), _)| *time);
+            let Some(next) = message.into_iter().chain(other).min().filter(|next| *next <= end) else {
+                self.now = end;
+                return Ok(());
+            };
+            self.now = self.now.max(next);
+            self.checks.now = self.now;
+            if message == Some(next) {
+                self.deliver()?;
+            } else if let Some((_, due)) = self.due.pop_first() {
+                self.happen(due)?;
+            }
+        }
+    }
+
+    fn happen(&mut self, due: Due) -> Result<(), Violation> {
+        match due {
+            Due::Tick(robot) => {
+                for sample in self.world.tick(robot, self.now) {
+                    self.act(robot, Event::Sample(sample))?;
+                }
+                self.after(TICK_S, Due::Tick(robot));
+            }
+            Due::Status(robot) => {
+                self.tell(robot)?;
+                self.after(STATUS_S, Due::Status(robot));
+            }
+            Due::Sync(robot) => {
+                if let Some(robot) = self.robots.get_mut(&robot) {
+                    robot.disk.sync();
+                }
+                self.after(SYNC_S, Due::Sync(robot));
+            }
+            Due::Start(robot) => self.start(robot)?,
+            Due::DiskFree(robot) => {
+                if let Some(robot) = self.robots.get_mut(&robot) {
+                    robot.disk.full = false;
+                }
+            }
+            Due::Blow(blow) => self.strike(blow)?,
+        }
+        Ok(())
+    }
+
+    fn strike(&mut self, blow: Blow) -> Result<(), Violation> {
+        match blow {
+            Blow::Weather(weather) => self.network.weather = weather,
+            Blow::Partition(sides) => {
+                self.network.sides = Some((1..).map(RobotId).zip(sides).collect());
+            }
+            Blow::Heal => self.network.sides = None,
+            Blow::Kill { robot, commands, back_s } => {
+                if let Some(robot) = self.robots.get_mut(&RobotId(robot)) {
+                    robot.doomed = Some((commands, back_s));
+                }
+            }
+            Blow::PowerLoss { robot, back_s } => {
+                let robot = RobotId(robot);
+                self.checks.damages(robot);
+                if self.die(robot, back_s)
+                    && let Some(robot) = self.robots.get_mut(&robot)
+                {
+                    robot.disk.lose_power();
+                }
+            }
+            Blow::DiskLoss { robot, back_s } => {
+                let robot = RobotId(robot);
+                self.checks.damages(robot);
+                if self.die(robot, back_s)
+                    && let Some(robot) = self.robots.get_mut(&robot)
+                {
+                    robot.disk.erase();
+                }
+            }
+            Blow::DiskFull { robot, seconds } => {
+                let robot = RobotId(robot);
+                if let Some(robot) = self.robots.get_mut(&robot) {
+                    robot.disk.full = true;
+                }
+                self.after(seconds, Due::DiskFree(robot));
+            }
+            Blow::Evict { robot, at } => self.act(RobotId(at), Event::Evict(RobotId(robot)))?,
+        }
+        Ok(())
+    }
+
+    /// The process of a robot ends; `false` if it was not running.
+    fn die(&mut self, id: RobotId, back_s: f64) -> bool {
+        let Some(robot) = self.robots.get_mut(&id) else { return false };
+        robot.doomed = None;
+        let ran = robot.node.take().is_some();
+        if ran {
+            self.outcome.deaths += 1;
+            self.after(back_s, Due::Start(id));
+        }
+        ran
+    }
+
+    /// A process begins, from what it finds on its disk.
+    fn start(&mut self, id: RobotId) -> Result<(), Violation> {
+        let torn = self.chance.happens(0.5).then(|| self.chance.unit());
+        let nonce = self.chance.bits();
+        let Some(robot) = self.robots.get_mut(&id) else { return Ok(()) };
+        if robot.node.is_some() {
+            return Ok(());
+        }
+        let records = match robot.disk.found(torn) {
+            Ok(records) => records,
+            Err(error) => return Err(self.checks.violation(Some(id), error.to_string())),
+        };
+        // Who has lost his disk asks the others first; as long as not all are there who know, he waits.
+        let lived = records.iter().any(|record| matches!(record, Record::Sample(_) | Record::Tick { .. }));
+        let lost = self.now > Timestamp(0) && !lived;
+        let full = robot.disk.full;
+        let all = self.robots.iter().all(|(other, robot)| {
+            *other == id
+                || (robot.node.is_some() && self.network.connected(id, *other))
+                || (robot.node.is_none() && robot.disk.is_empty())
+        });
+        if full || (lost && !all) {
+            self.after(0.5, Due::Start(id));
+            return Ok(());
+        }
+        let Some(robot) = self.robots.get_mut(&id) else { return Ok(()) };
+        #[allow(unused_mut, reason = "a mistake may be planted")]
+        let mut node = Node::recover(robot.config.clone(), nonce, records);
+        #[cfg(feature = "planted")]
+        if let Some(planted) = self.options.planted {
+            node.plant(planted);
+        }
+        robot.node = Some(node);
+        if lost {
+            // What reached nobody was never said.
+            let others = self.robots.iter().filter(|(other, _)| **other != id);
+            let heard =
+                others.filter_map(|(_, robot)| robot.node.as_ref()).flat_map(|node| node.ledger().digests());
+            let heard: BTreeSet<LogId> =
+                heard.map(|digest| digest.log).filter(|log| log.robot == id).collect();
+            self.checks.unsaid(id, &heard);
+            let others: Vec<RobotId> = self.robots.keys().copied().filter(|other| *other != id).collect();
+            for other in others {
+                let status =
+                    self.robots.get_mut(&other).and_then(|robot| Some(robot.node.as_mut()?.status()));
+                if let Some(status) = status {
+                    self.act(id, Event::Status(status))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A node tells the others what it holds; what it holds is checked.
+    fn tell(&mut self, id: RobotId) -> Result<(), Violation> {
+        let Some(node) = self.robots.get_mut(&id).and_then(|robot| robot.node.as_mut()) else {
+            return Ok(());
+        };
+        self.checks.node(node)?;
+        let status = Message::Status(node.status());
+        self.broadcast(id, &status);
+        Ok(())
+    }
+
+    fn broadcast(&mut self, from: RobotId, message: &Message) {
+        for to in self.robots.keys().filter(|to| **to != from) {
+            self.network.send(self.now, from, *to, message);
+        }
+    }
+
+    fn deliver(&mut self) -> Result<(), Violation> {
+        let Some(delivery) = self.network.take() else { return Ok(()) };
+        let (from, to) = (delivery.from, delivery.to);
+        let node = self.robots.get_mut(&to).and_then(|robot| robot.node.as_mut());
+        let Some(node) = node else { return Ok(()) };
+        match delivery.message {
+            Message::Entries(entries) => self.act(to, Event::Entries(entries)),
+            Message::Status(status) => self.act(to, Event::Status(status)),
+            Message::SnapshotPart(part) => self.act(to, Event::SnapshotPart(from, part)),
+            Message::FactsRequest(request) => {
+                let reply = Message::Entries(node.serve(&request, limits::ENTRIES));
+                self.network.send(self.now, to, from, &reply);
+                Ok(())
+            }
+            Message::SnapshotRequest(request) => {
+                if let Some(part) = node.serve_snapshot(&request) {
+                    self.network.send(self.now, to, from, &Message::SnapshotPart(part));
+                }
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Hands an event to a node and does what follows, as far as its process lives.
+    fn act(&mut self, id: RobotId, event: Event) -> Result<(), Violation> {
+        let Some(node) = self.robots.get_mut(&id).and_then(|robot| robot.node.as_mut()) else {
+            return Ok(());
+        };
+        for command in node.handle(event) {
+            if let Some(robot) = self.robots.get_mut(&id)
+                && let Some((commands, back_s)) = robot.doomed
+            {
+                if commands == 0 {
+                    self.die(id, back_s);
+                    return Ok(());
+                }
+                robot.doomed = Some((commands - 1, back_s));
+            }
+            if !self.execute(id, command)? {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Does what a node wants; `false` if its process has ended over it.
+    fn execute(&mut self, id: RobotId, command: Command) -> Result<bool, Violation> {
+        match command {
+            Command::Journal(records) => {
+                let sync = journal::must_sync(&records, id);
+                let Some(robot) = self.robots.get_mut(&id) else { return Ok(false) };
+                if !robot.disk.full {
+                    for record in &records {
+                        if let Record::Entry(entry) = record
+                            && entry.id.robot == id
+                        {
+                            self.checks.says(entry)?;
+                        }
+                    }
+                }
+                if !robot.disk.append(records) {
+                    self.die(id, 1.0);
+                    return Ok(false);
+                }
+                self.outcome.most_records = self.outcome.most_records.max(robot.disk.records);
+                if sync {
+                    robot.disk.sync();
+                }
+            }
+            Command::Publish(entries) => {
+                for entry in &entries {
+                    self.checks.says(entry)?;
+                }
+                for chunk in entries.chunks(limits::ENTRIES) {
+                    self.broadcast(id, &Message::Entries(chunk.to_vec()));
+                }
+            }
+            Command::Ask { peer, request } => {
+                self.network.send(self.now, id, peer, &Message::FactsRequest(request));
+            }
+            Command::AskSnapshot { peer, request } => {
+                self.network.send(self.now, id, peer, &Message::SnapshotRequest(request));
+            }
+            Command::Closed { cut, hash, .. } => {
+                let Some(robot) = self.robots.get_mut(&id) else { return Ok(false) };
+                let Some(node) = &robot.node else { return Ok(false) };
+                self.checks.closes(id, cut, hash);
+                if robot.disk.records > MOST_RECORDS {
+                    robot.disk.replace(node.compacted());
+                }
+            }
+            Command::Estimate(_) => {}
+            Command::Notice(notice) => self.notice(id, &notice)?,
+        }
+        Ok(true)
+    }
+
+    fn notice(&mut self, id: RobotId, notice: &Notice) -> Result<(), Violation> {
+        match notice {
+            Notice::Evicted { .. } => {
+                self.outcome.evictions += 1;
+                self.checks.damages(id);
+            }
+            Notice::SnapshotTaken { .. } => {
+                self.outcome.taken_over += 1;
+            }
+            Notice::Equivocation { .. }
+            | Notice::Fork { .. }
+            | Notice::OwnLogAhead { .. }
+            | Notice::Superseded { .. }
+            | Notice::SnapshotRefused { .. }
+            | Notice::SnapshotDisagreement { .. }
+            | Notice::OtherConfiguration { .. } => {
+                return Err(self.checks.violation(Some(id), notice.to_string()));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Everything works again, and the team goes on for a while.
+    fn heal(&mut self) -> Result<(), Violation> {
+        self.network.sides = None;
+        self.network.weather = Weather { delay_s: 0.01, jitter_s: 0.01, ..Weather::default() };
+        self.due.retain(|_, due| !matches!(due, Due::Blow(_)));
+        for robot in self.robots.values_mut() {
+            robot.doomed = None;
+            robot.disk.full = false;
+        }
+        self.until(self.now.plus_seconds(HEALED_S))
+    }
+
+    /// The input ends, and the team must come to agree.
+    fn agree(&mut self) -> Result<(), Violation> {
+        self.due.retain(|_, due| !matches!(due, Due::Tick(_)));
+        let robots: Vec<RobotId> = self.robots.keys().copied().collect();
+        for robot in &robots {
+            self.act(*robot, Event::InputEnded)?;
+        }
+        for _ in 0..ROUNDS {
+            self.until(self.now.plus_seconds(STATUS_S))?;
+            if self.agreed() {
+                return self.judge(&robots);
+            }
+        }
+        let mut states = Vec::new();
+        for (id, robot) in &mut self.robots {
+            if let Some(node) = &mut robot.node {
+                let status = node.status();
+                let logs: Vec<String> = status
+                    .logs
+                    .iter()
+                    .map(|log| format!("{}.{}:{}", log.log.robot, log.log.boot, log.held))
+                    .collect();
+                states.push(format!(
+                    "robot {id}: estimate {}, {:?}, drained {}, {:?}, logs {}",
+                    status.estimate,
+                    status.facts,
+                    status.drained,
+                    status.closure,
+                    logs.join(" ")
+                ));
+            }
+        }
+        Err(self.checks.violation(None, format!("the team does not agree: {}", states.join("; "))))
+    }
+
+    fn agreed(&mut self) -> bool {
+        let mut statuses = self.robots.values_mut().filter_map(|robot| Some(robot.node.as_mut()?.status()));
+        let Some(first) = statuses.next() else { return false };
+        let fine = |status: &pleiad_protocol::Status| {
+            let member = status.closure.as_ref().is_none_or(|closure| closure.joining.is_none());
+            status.drained && status.facts.pending == 0 && member
+        };
+        let mut all = 1;
+        let same = statuses.all(|status| {
+            all += 1;
+            status.estimate == first.estimate && fine(&status)
+        });
+        same && fine(&first) && all == self.robots.len()
+    }
+
+    fn judge(&mut self, robots: &[RobotId]) -> Result<(), Violation> {
+        self.checks.snapshots()?;
+        let closing = self.plan.cell_s.is_some();
+        for id in robots {
+            let Some(robot) = self.robots.get_mut(id) else { continue };
+            let Some(node) = &mut robot.node else { continue };
+            let fold = robot.config.fold;
+            self.checks.node(node)?;
+            self.checks.settled(node, &fold)?;
+            // Nothing but the last two cells can be open, and what the others may still ask for.
+            let kept = node.ledger().kept();
+            if closing && kept > 300 * robots.len() {
+                return Err(self.checks.violation(Some(*id), format!("{kept} items are kept")));
+            }
+            let counts = node.ledger().counts();
+            self.outcome.facts = self.outcome.facts.max(counts.used);
+            self.outcome.expired = self.outcome.expired.max(counts.expired);
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Outcome {
+        Outcome {
+            seconds: self.now.seconds(),
+            messages: self.network.sent(),
+            cuts: self.checks.cuts,
+            most_kept: self.checks.most_kept,
+            ..self.outcome
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Schedules of a simulated team: losses, partitions, kills, lost power and lost disks, every invariant of
+//! the ledger checked on the way. A seed that fails is replayed by the `schedules` example.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
+use pleiad_sim_peers::simulation::{Options, Outcome, run};
+
+fn all(seeds: std::ops::Range<u64>, options: &Options) -> Vec<Outcome> {
+    let one = |seed| {
+        run(seed, options).unwrap_or_else(|violation| {
+            let kind = if options.partitions_only { " --partitions" } else { "" };
+            panic!(
+                "seed {seed}: {violation}\nreplay: cargo run -p pleiad-tests --features planted \
+                 --example schedules -- --seeds {seed}..{}{kind}",
+                seed + 1
+            )
+        })
+    };
+    seeds.map(one).collect()
+}
+
+#[test]
+fn two_hundred_schedules_keep_every_invariant() {
+    let outcomes = all(0..100, &Options { partitions_only: true, ..Options::default() });
+    assert!(outcomes.iter().all(|outcome| outcome.deaths == 0 && outcome.expired == 0));
+    assert!(outcomes.iter().map(|outcome| outcome.cuts).sum::<u64>() > 1000);
+    let outcomes = all(0..100, &Options::default());
+    assert!(outcomes.iter().map(|outcome| outcome.deaths).sum::<u64>() > 50);
+}
+
+#[test]
+fn a_seed_gives_the_same_run_twice() {
+    for seed in 0..3 {
+        let once = || run(seed, &Options::default()).unwrap();
+        assert_eq!(once(), once());
+    }
+}
+
+#[cfg(feature = "slow")]
+#[test]
+fn a_thousand_partitions_heal() {
+    all(0..1000, &Options { partitions_only: true, ..Options::default() });
+}
+
+#[cfg(feature = "planted")]
+mod planted {
+    use super::*;
+    use pleiad_sim_peers::simulation::Planted;
+
+    /// How many schedules it takes to find a mistake.
+    fn found_after(planted: Planted) -> Option<u64> {
+        let options = Options { planted: Some(planted), ..Options::default() };
+        (0..200).find(|seed| run(*seed, &options).is_err()).map(|seed| seed + 1)
+    }
+
+    #[test]
+    fn every_planted_mistake_is_found() {
+        for planted in [
+            Planted::CountDuplicates,
+            Planted::SkipRewind,
+            Planted::ForgetLateNoise,
+            Planted::MixBoots,
+            Planted::CloseByNumbers,
+            Planted::AnswerBlindly,
+            Planted::PublishFirst,
+        ] {
+            let found = found_after(planted);
+            println!("{planted:?}: after {found:?} schedules");
+            assert!(found.is_some(), "{planted:?} is not found");
+        }
+    }
+}
