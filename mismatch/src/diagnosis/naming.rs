@@ -189,7 +189,9 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
 }
 
 /// Lag and delay together: without encoders their sum is known far better than either, and one of them may
-/// have vanished.
+/// have vanished. It is from the stamp of a command to the motion by the reference's clock, in the middle of the
+/// recordings: what the robot's clock is found to be ahead by then is taken off, because a drift in the fit
+/// shares the same delay between the two.
 pub(crate) fn total(
     units: &[&Unit<'_>],
     (fit, covariance, group): (&Fit, &DMatrix<f64>, &[usize]),
@@ -200,8 +202,26 @@ pub(crate) fn total(
     }
     let slot = |term: &usize| fit.slots.iter().position(|slot| *slot == (*term, 0));
     let slots: Vec<usize> = group.iter().map(slot).collect::<Option<_>>()?;
-    let variance: f64 = slots.iter().flat_map(|&a| slots.iter().map(move |&b| covariance[(a, b)])).sum();
-    let value: f64 = group.iter().map(|&term| fit.terms[term].values[0]).sum();
+    let mut parts: Vec<(usize, f64)> = slots.into_iter().map(|slot| (slot, 1.0)).collect();
+    let acting = || units.iter().filter(|unit| main.acts_on(unit.robot));
+    let middles = acting().map(|unit| f64::midpoint(unit.span_s.0, unit.span_s.1));
+    let middle_s = middles.sum::<f64>() / acting().count().max(1) as f64;
+    for (position, &(term, parameter)) in fit.slots.iter().enumerate() {
+        let own = &fit.terms[term];
+        let seconds = match own.effect {
+            Effect::ClockOffset => 1.0,
+            Effect::ClockDrift => 1e-6 * middle_s,
+            _ => continue,
+        };
+        if parameter == 0 && acting().all(|unit| own.acts_on(unit.robot)) {
+            parts.push((position, -seconds));
+        }
+    }
+    let each = || parts.iter().copied();
+    let variance: f64 =
+        each().flat_map(|(a, by)| each().map(move |(b, with)| by * with * covariance[(a, b)])).sum();
+    let value: f64 =
+        each().map(|(slot, by)| by * fit.terms[fit.slots[slot].0].values[fit.slots[slot].1]).sum();
     let half = Z_95 * variance.max(0.0).sqrt();
     Some(("total_s".to_owned(), Estimate { value, unit: "s".to_owned(), ci95: [value - half, value + half] }))
 }
