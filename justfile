@@ -29,7 +29,7 @@ demo *arguments:
 recordings:
     cargo test -p pleiad-recording --features recordings --test real
     cargo test -p pleiad-mismatch --features recordings --test recordings
-    cargo test -p pleiad-tests --features recordings --test recordings --test recordings_diagnosis --test recordings_faults
+    cargo test -p pleiad-tests --features recordings --test recordings --test recordings_diagnosis --test recordings_mrclam_diagnosis --test recordings_faults
 
 # Consistency over many seeded runs; takes minutes.
 monte-carlo:
