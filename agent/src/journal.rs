@@ -3,7 +3,7 @@
 //!
 //! File: the magic `PLEIADJ1`, then frames of `length u32 | crc32 u32 | payload`, little-endian. A payload
 //! is a list of `length u32 | message`, a message being one encoded sample or entry of the protocol, or
-//! what only journals hold ([`kept`]).
+//! what only journals hold (`kept`).
 
 mod kept;
 

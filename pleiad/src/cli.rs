@@ -85,7 +85,7 @@ pub struct RunArgs {
     /// Coordinates of the filter's error.
     #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
     pub error: ErrorArg,
-    /// A file of [[fault]] tables: what goes wrong between the robots (docs/faults.md); those of the scenario
+    /// A file of fault tables: what goes wrong between the robots (docs/faults.md); those of the scenario
     /// itself if absent.
     #[arg(long, value_name = "FILE")]
     pub faults: Option<PathBuf>,
@@ -219,7 +219,7 @@ pub struct DiagnoseArgs {
 
 #[derive(Debug, Args)]
 pub struct FaultsArgs {
-    /// A scenario (a TOML file, with [[fault]] tables if it has any) or a recording (a folder).
+    /// A scenario (a TOML file, with fault tables if it has any) or a recording (a folder).
     pub input: PathBuf,
     /// Which strategies: exact, factored, pairwise, intersection, split_intersection, naive, independent.
     #[arg(
@@ -240,7 +240,7 @@ pub struct FaultsArgs {
     /// The first seed; a scenario's own if absent.
     #[arg(long)]
     pub seed: Option<u64>,
-    /// A file with [[fault]] tables, in place of those of the scenario.
+    /// A file with fault tables, in place of those of the scenario.
     #[arg(long)]
     pub faults: Option<PathBuf>,
     /// Which landmarks of a recording are known: known, none, or numbers as in 6,7.

@@ -1,4 +1,4 @@
-//! Roumeliotis & Bekey 2002 [roumeliotis2002] as published: the centralized filter in the additive error,
+//! Roumeliotis & Bekey 2002 (`roumeliotis2002`) as published: the centralized filter in the additive error,
 //! distributed by factors. Every robot keeps its block and its own row; at a meeting the observer computes
 //! the gain of every robot from the two rows and broadcasts them, and everyone applies what it hears.
 //!

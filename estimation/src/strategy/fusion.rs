@@ -1,6 +1,6 @@
 //! Covariance intersection of an estimate with a measurement whose error may be correlated with it in a way
-//! nobody knows [julier1997], and its split form, in which only the part that may be correlated is inflated
-//! [julier2001].
+//! nobody knows (`julier1997`), and its split form, in which only the part that may be correlated is inflated
+//! (`julier2001`).
 //!
 //! With weight `w`, `P_w = P_c / w + P_i` and `R_w = R_c / (1 - w) + R_i`, then the ordinary update with
 //! `P_w` and `R_w`. For every `w` in (0, 1) the result bounds the true covariance, whatever the correlation

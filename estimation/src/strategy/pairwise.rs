@@ -1,4 +1,4 @@
-//! Luft, Schubert, Roumeliotis & Burgard 2018 [luft2018]: every robot keeps its block and a factor `s_ij` of
+//! Luft, Schubert, Roumeliotis & Burgard 2018 (`luft2018`): every robot keeps its block and a factor `s_ij` of
 //! each of its correlations, `P_ij = s_ij s_ji^T`. When two robots meet they update their pair exactly, and
 //! each of them scales its other factors by `P_a+ P_a^-1`: the approximation that spares everyone else.
 //!
