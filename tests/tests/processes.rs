@@ -7,6 +7,8 @@
 mod by_hand;
 #[path = "processes/coordinator.rs"]
 mod coordinator;
+#[path = "processes/faulty.rs"]
+mod faulty;
 #[path = "processes/late.rs"]
 mod late;
 #[path = "processes/paused.rs"]
