@@ -83,12 +83,16 @@ fn lateness_and_turn(evidence: &Evidence<'_>, robot: RobotId, model: &RobotModel
             model.with(ActiveEffect::new(effect, &[seconds]).expect("one parameter"))
         });
         let found = residuals_of(evidence, robot, &model, Channel::CommandedBody);
+        // A tenth less of the commanded turns leaves a tenth of the predicted yaw.
+        let less = ActiveEffect::new(Effect::ActuatorGain, &[0.0, -0.1]).expect("two parameters");
+        let slower = residuals_of(evidence, robot, &model.with(less), Channel::CommandedBody);
         let (mut left, mut product, mut square) = (0.0, 0.0, 0.0);
-        for row in &found.rows {
-            let (yaw, yaw_rate) = (row.values()[2], row.regime.yaw_rate_rad_s);
+        for (row, slower) in found.rows.iter().zip(&slower.rows) {
+            let yaw = row.values()[2];
+            let predicted = (slower.values()[2] - yaw) / 0.1;
             left += yaw.abs();
-            product += yaw * yaw_rate;
-            square += yaw_rate * yaw_rate;
+            product += yaw * predicted;
+            square += predicted * predicted;
         }
         if left < best.0 {
             best = (left, found.rows.len(), lag + delay, product / square);
