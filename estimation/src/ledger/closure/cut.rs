@@ -1,0 +1,283 @@
+//! The snapshot at a cut, and the ledger that rests on it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Closing, Decision, sealed_within};
+use crate::fact::{Body, Entry, EntryId, LogId};
+use crate::fold::{FactKey, fold};
+use crate::ledger::Ledger;
+use crate::ledger::checkpoint::{Checkpoint, LogBase};
+use crate::{BootIndex, RobotId, Timestamp};
+
+impl Ledger {
+    pub(super) fn checkpoint_at(&self, closing: &Closing, cut: Timestamp) -> Checkpoint {
+        let base = &closing.base;
+        let (positions, limits) = Self::positions_at(closing, cut);
+        let position = |id: &LogId| positions.get(id).copied().unwrap_or(0);
+        let mut joint = base.joint.clone();
+        let mut counts = base.counts;
+        for (key, record) in self.facts.range(..=FactKey::last_at(cut)) {
+            fold(&mut joint, &self.config, key, &record.fact);
+            counts.add(record);
+        }
+        let lost = self.pending.values().filter(|observation| observation.time <= cut).count();
+        counts.expired += lost;
+        counts.void += self.void.keys().filter(|id| self.time_of(**id).is_some_and(|t| t <= cut)).count();
+
+        let accounted = self.logs.iter().flat_map(|(id, log)| {
+            let before = position(id);
+            log.entries_from(log.base).iter().take_while(move |entry| entry.id.sequence.0 < before)
+        });
+        let mut open = BTreeMap::new();
+        let (mut profiles, mut clocks) = (base.profiles.clone(), base.clocks.clone());
+        let (mut seals, mut views) = (base.seals.clone(), base.views.clone());
+        for entry in base.open.values().chain(accounted) {
+            match &entry.body {
+                Body::Profile(profile) => {
+                    profiles.entry((entry.id.log(), profile.index)).or_insert(profile.noise);
+                }
+                Body::ClockMap(map) => {
+                    clocks.insert(entry.id.log(), *map);
+                }
+                Body::Seal(seal) => {
+                    let slot = seals.entry(entry.id.robot).or_insert_with(|| (entry.id, seal.clone()));
+                    if entry.id > slot.0 {
+                        *slot = (entry.id, seal.clone());
+                    }
+                }
+                Body::Vote(vote) => views.hear(entry.id, vote),
+                Body::Boot(boot) if boot.time > cut => {
+                    open.insert(entry.id, entry.clone());
+                }
+                Body::Observation(observation) if observation.time > cut => {
+                    open.insert(entry.id, entry.clone());
+                }
+                Body::Half(half)
+                    if self.still_open(half.observation, cut, position(&half.observation.log()), &limits) =>
+                {
+                    open.insert(entry.id, entry.clone());
+                }
+                Body::Boot(_) | Body::Observation(_) | Body::Half(_) => {}
+            }
+        }
+        while let Some((vote, _)) = views.decided() {
+            let vote = vote.clone();
+            views.apply(&vote, |robot| sealed_within(closing, robot, &vote));
+        }
+        views.terms.retain(|term| term.until.is_none_or(|until| until >= cut));
+
+        let mut logs = BTreeMap::new();
+        for (id, start) in positions.iter().filter(|(_, start)| **start > 0) {
+            if let Some(log) = self.logs.get(id) {
+                let limit = limits.get(id).copied();
+                logs.insert(*id, LogBase { start: *start, chain: log.chain_before(*start), limit });
+            }
+        }
+        let mut floors = base.floors.clone();
+        forget_ended(&mut logs, &mut floors, &open);
+        let kept = |id: &LogId| logs.contains_key(id) || open.keys().any(|open| open.log() == *id);
+        profiles.retain(|(id, _), _| kept(id));
+        clocks.retain(|id, _| kept(id));
+        Checkpoint {
+            time: cut,
+            configuration: self.configuration,
+            joint,
+            logs,
+            floors,
+            profiles,
+            clocks,
+            seals,
+            views,
+            open,
+            counts,
+        }
+    }
+
+    fn time_of(&self, id: EntryId) -> Option<Timestamp> {
+        self.observation(id).map(|observation| observation.time)
+    }
+
+    /// Whether an answer can still matter after a cut that accounts for its observation's log up to
+    /// `position`: the observation is later, or not accounted for.
+    fn still_open(
+        &self,
+        observation: EntryId,
+        cut: Timestamp,
+        position: u64,
+        limits: &BTreeMap<LogId, u64>,
+    ) -> bool {
+        if self.is_over(observation) {
+            return false;
+        }
+        if observation.sequence.0 >= position {
+            return limits.get(&observation.log()).is_none_or(|limit| observation.sequence.0 < *limit);
+        }
+        self.time_of(observation).is_some_and(|time| time > cut)
+    }
+
+    /// Whether an entry was accounted for by the last cut and does not matter any more.
+    pub(in crate::ledger) fn is_over(&self, id: EntryId) -> bool {
+        let Some(closing) = &self.closing else { return false };
+        if closing.base.open.contains_key(&id) {
+            return false;
+        }
+        closing.base.floors.get(&id.robot).is_some_and(|floor| id.boot < *floor)
+            || closing.base.logs.get(&id.log()).is_some_and(|base| id.sequence.0 < base.start)
+    }
+
+    /// How far each log is accounted for at a cut, and where logs end: of every member up to its first seal
+    /// that reaches the cut; of evicted ones all that is accepted; and the votes that decided who is who.
+    fn positions_at(closing: &Closing, cut: Timestamp) -> (BTreeMap<LogId, u64>, BTreeMap<LogId, u64>) {
+        let base = &closing.base;
+        let mut positions: BTreeMap<LogId, u64> =
+            base.logs.iter().map(|(id, log)| (*id, log.start)).collect();
+        let mut limits: BTreeMap<LogId, u64> =
+            base.logs.iter().filter_map(|(id, log)| Some((*id, log.limit?))).collect();
+        let forgotten = |id: LogId| base.floors.get(&id.robot).is_some_and(|floor| id.boot < *floor);
+        let mut raise = |id: LogId, to: u64| {
+            if !forgotten(id) {
+                let position = positions.entry(id).or_insert(0);
+                *position = (*position).max(to);
+            }
+        };
+        for term in closing.views.terms.iter().filter(|term| term.from < cut) {
+            if term.until.is_some_and(|until| until < cut) {
+                for (id, held) in &term.limits {
+                    raise(*id, *held);
+                    limits.insert(*id, *held);
+                }
+                continue;
+            }
+            let accounted = base.seals.get(&term.robot).filter(|(id, _)| id.boot >= term.boot);
+            if accounted.is_some_and(|(_, seal)| seal.observed.min(seal.answered) >= cut) {
+                continue;
+            }
+            let seals = closing.seals.get(&term.robot).into_iter().flatten();
+            for (id, seal) in seals.filter(|(id, _)| id.boot >= term.boot) {
+                for log in &seal.logs {
+                    let of = LogId { robot: id.robot, boot: log.boot };
+                    if log.last && !forgotten(of) {
+                        limits.insert(of, log.length);
+                        raise(of, log.length);
+                    }
+                }
+                if seal.observed.min(seal.answered) >= cut {
+                    raise(id.log(), id.sequence.0 + 1);
+                    for log in &seal.logs {
+                        raise(LogId { robot: id.robot, boot: log.boot }, log.length);
+                    }
+                    break;
+                }
+            }
+        }
+        let mut needed = false;
+        for Decision { vote, entries } in closing.decisions.iter().rev() {
+            let ended = |robot: &RobotId| {
+                let terms = closing.views.terms.iter().filter(|term| term.robot == *robot);
+                terms.filter_map(|term| term.until).any(|until| until < cut)
+            };
+            needed |= vote.removed.iter().any(ended) || (!vote.added.is_empty() && vote.from < cut);
+            if needed {
+                for id in entries {
+                    raise(id.log(), id.sequence.0 + 1);
+                }
+            }
+        }
+        // Votes can lie beyond the first seal that reaches the cut, and more seals before them.
+        let accounted = |id: &EntryId| positions.get(&id.log()).is_some_and(|to| id.sequence.0 < *to);
+        let seals = closing.seals.values().flatten().filter(|(id, _)| accounted(id));
+        let ended = seals.flat_map(|(id, seal)| {
+            let last = seal.logs.iter().filter(|log| log.last);
+            last.map(|log| (LogId { robot: id.robot, boot: log.boot }, log.length))
+        });
+        let ended: Vec<(LogId, u64)> = ended.filter(|(log, _)| !forgotten(*log)).collect();
+        for (log, length) in ended {
+            limits.entry(log).or_insert(length);
+            let position = positions.entry(log).or_insert(0);
+            *position = (*position).max(length);
+        }
+        (positions, limits)
+    }
+
+    /// Makes a snapshot of this ledger's own the ground it rests on.
+    pub(super) fn rest_on(&mut self, checkpoint: Checkpoint) {
+        let cut = checkpoint.time;
+        let last = FactKey::last_at(cut);
+        self.facts = self.facts.split_off(&last);
+        self.pending.retain(|_, observation| observation.time > cut);
+        self.snapshots.forget_until(last);
+        self.folded = self.folded.filter(|folded| *folded > last);
+        if self.folded.is_none() {
+            self.joint = checkpoint.joint.clone();
+        }
+        self.profiles
+            .retain(|(log, _), _| checkpoint.floors.get(&log.robot).is_none_or(|floor| log.boot >= *floor));
+        let floors = checkpoint.floors.clone();
+        self.logs.retain(|id, _| floors.get(&id.robot).is_none_or(|floor| id.boot >= *floor));
+        for (id, base) in &checkpoint.logs {
+            let log = self.logs.entry(*id).or_default();
+            log.base = base.start;
+        }
+        if let Some(closing) = &mut self.closing {
+            for seals in closing.seals.values_mut() {
+                let reached = |id: &EntryId| {
+                    checkpoint.logs.get(&id.log()).is_some_and(|base| id.sequence.0 < base.start)
+                };
+                seals.retain(|id, _| {
+                    !reached(id) && floors.get(&id.robot).is_none_or(|floor| id.boot >= *floor)
+                });
+            }
+            let epoch = checkpoint.views.epoch;
+            closing.decisions.retain(|decision| decision.vote.epoch >= epoch);
+            closing.views.terms.retain(|term| term.until.is_none_or(|until| until >= cut));
+            let starts = checkpoint.logs.iter().map(|(id, base)| (*id, base.start)).collect();
+            closing.cuts.push((cut, starts));
+            closing.base = checkpoint;
+        }
+        let answers = std::mem::take(&mut self.answers);
+        self.answers = answers.into_iter().filter(|((id, _), _)| !self.is_over(*id)).collect();
+        let void = std::mem::take(&mut self.void);
+        self.void = void.into_iter().filter(|(id, _)| !self.is_over(*id)).collect();
+        self.release();
+    }
+
+    /// Forgets entries that no member can ask for any more, because all have closed past them.
+    pub(super) fn release(&mut self) {
+        let Some(closing) = &self.closing else { return };
+        let reached = closing
+            .views
+            .active()
+            .map(|term| self.seal_of(term.robot).map_or(Timestamp::MIN, |seal| seal.closed));
+        let reached = reached.min().unwrap_or(Timestamp::MIN).min(closing.base.time);
+        let Some(closing) = &mut self.closing else { return };
+        let over = closing.cuts.partition_point(|(cut, _)| *cut <= reached);
+        let Some(last) = over.checked_sub(1) else { return };
+        for (id, start) in &closing.cuts[last].1 {
+            if let Some(log) = self.logs.get_mut(id) {
+                log.forget_before(*start);
+            }
+        }
+        closing.cuts.drain(..last);
+    }
+}
+
+/// Logs of earlier boots that have ended and are accounted for are forgotten, from the earliest on.
+fn forget_ended(
+    logs: &mut BTreeMap<LogId, LogBase>,
+    floors: &mut BTreeMap<RobotId, BootIndex>,
+    open: &BTreeMap<EntryId, Entry>,
+) {
+    let robots: BTreeSet<RobotId> = logs.keys().map(|id| id.robot).collect();
+    for robot in robots {
+        let boots: Vec<LogId> = logs.keys().copied().filter(|id| id.robot == robot).collect();
+        for pair in boots.windows(2) {
+            let [id, next] = [pair[0], pair[1]];
+            let ended = logs.get(&id).is_some_and(|base| base.limit == Some(base.start));
+            if !ended || open.keys().any(|open| open.log() == id) {
+                break;
+            }
+            logs.remove(&id);
+            floors.insert(robot, next.boot);
+        }
+    }
+}
