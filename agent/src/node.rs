@@ -1,6 +1,7 @@
 //! The node: one robot's part of the team's filter as a pure state machine. Events in, commands out; no
 //! clock, no file, no network.
 
+mod boots;
 mod closing;
 mod commands;
 mod corrector;
@@ -19,16 +20,12 @@ pub use views::SettledEstimate;
 
 use closing::Membership;
 use corrector::Corrector;
-use pleiad_estimation::fact::{
-    Absolute, Answer, Body, Boot, Continuation, Entry, EntryId, Half, LogId, NoiseRef, Observation, Profile,
-    Quantity, VoidReason,
-};
+use pleiad_estimation::fact::{Answer, Body, Entry, EntryId, Half, LogId, NoiseRef, Observation, VoidReason};
 use pleiad_estimation::ledger::{Insertion, Ledger, Refusal};
 use pleiad_estimation::motion::DeadReckoning;
 use pleiad_estimation::nominal::Outside;
 use pleiad_estimation::sample::{Reading, Sample, Target};
-use pleiad_estimation::symmetric::Symmetric3;
-use pleiad_estimation::{BootIndex, Pose2, RobotId, Sequence, Timestamp};
+use pleiad_estimation::{BootIndex, RobotId, Sequence, Timestamp};
 use pleiad_protocol::{FactsRequest, LogRange, Status};
 use segments::Segments;
 
@@ -336,74 +333,6 @@ impl Node {
         if let Some(corrector) = &mut self.corrector {
             corrector.hear(entry);
         }
-    }
-
-    /// A boot begins at `time`: at the first odometry of this start, and after every gap of the odometry.
-    fn begin_boot(&mut self, time: Timestamp) {
-        self.begin_boot_at(time, None);
-    }
-
-    /// A boot begins; `rebased` is where its trajectory begins if it goes on without a gap.
-    fn begin_boot_at(&mut self, time: Timestamp, rebased: Option<Pose2>) {
-        let joined = self.membership.joining.take();
-        let index = self.next_boot().max(joined.unwrap_or_default());
-        let place = self.ledger.settle().member(self.config.robot).map(|member| member.boot);
-        let continuation = self.segments.last().map(|(previous, trajectory)| {
-            let (end, last) = trajectory.end();
-            let gap_s = if rebased.is_some() { 0.0 } else { time.seconds_since(end) };
-            let [x, y, yaw] = self.config.motion_limits.map(|limit| (limit * gap_s).powi(2));
-            Continuation { previous, time: end, last, gap: Symmetric3::diagonal(x, y, yaw) }
-        });
-        // Evicted in a boot that the team never heard of: nothing there to carry on from.
-        let continuation = continuation.filter(|from| joined.is_none() || place == Some(from.previous));
-        let prior = self.config.prior.filter(|prior| continuation.is_none() && prior.for_boot == index.0);
-        // The nominal trajectory begins where the last one ended, so that `odom` has no jump; the first
-        // one at the prior, so that it reads as dead reckoning in the map.
-        let nominal = match (&continuation, &self.config.prior) {
-            (Some(continuation), _) => rebased.unwrap_or(continuation.last.nominal),
-            (None, Some(prior)) => prior.pose,
-            (None, None) => Pose2::identity(),
-        };
-        let odom = self.odom_of(&Boot { time, nonce: 0, configuration: 0, nominal, continuation });
-        self.lived = true;
-        self.lived_boots.insert(index);
-        self.rebased = None;
-        self.first_odometry = self.first_odometry.or(Some(time));
-        self.boot = Some(index);
-        self.known_boot = Some(index);
-        self.segments.begin(index, time, nominal, odom, self.config.history_samples);
-        self.keep_tick();
-        let nonce = self.nonce.wrapping_add(u64::from(index.0));
-        let configuration = self.ledger.configuration();
-        self.say(index, Body::Boot(Boot { time, nonce, configuration, nominal, continuation }));
-        self.say(index, Body::ClockMap(self.config.clock));
-        for (profile, noise) in (0u16..).zip(self.config.sensors.profiles()) {
-            if let Some(noise) = noise {
-                self.say(index, Body::Profile(Profile { index: profile, noise }));
-            }
-        }
-        if let Some(prior) = prior
-            && let Ok(observer) = self.segments.current(time)
-        {
-            let quantity = Quantity::Absolute(Absolute::Pose(prior.pose));
-            let noise = NoiseRef::Explicit(prior.noise);
-            self.say(index, Body::Observation(Observation { time, quantity, noise, observer }));
-        } else if continuation.is_none() {
-            self.notice(Notice::NoPrior { boot: index });
-        }
-    }
-
-    /// `odom_from_nominal` of a boot: the published frame goes on from the boot it carries on.
-    fn odom_of(&self, boot: &Boot) -> Pose2 {
-        boot.continuation.as_ref().map_or_else(Pose2::identity, |from| {
-            let odom = self.segments.odom();
-            // Exactly as it was where the trajectory goes on as it was.
-            if from.last.nominal == boot.nominal {
-                odom
-            } else {
-                odom.compose(&from.last.nominal).compose(&boot.nominal.inverse())
-            }
-        })
     }
 
     /// Makes a fact of an own observation that the odometry has reached.

@@ -35,11 +35,8 @@ struct Faults {
 #[derive(Debug)]
 struct State {
     plan: FaultPlan,
-    /// Second 0 of the plan; the first instant that is told if not known before.
-    origin: Option<Timestamp>,
-    now: Option<Timestamp>,
-    /// None before the first instant.
-    injector: Option<Injector>,
+    /// The last instant told, and the plan since the first; `None` before any.
+    begun: Option<(Timestamp, Injector)>,
 }
 
 /// What reaches its receiver, after how long.
@@ -57,11 +54,10 @@ impl Faults {
     fn judge(&self, from: RobotId, to: RobotId, payload: &[u8]) -> Vec<Arrival> {
         let verdict = {
             let mut state = self.state();
-            let state = &mut *state;
             // Before the first instant nothing has begun to go wrong.
-            match (state.now, &mut state.injector) {
-                (Some(now), Some(injector)) => injector.judge(now, from, to, payload),
-                _ => Verdict::Delivered { after_s: 0.0, again_after_s: None, damage: None },
+            match &mut state.begun {
+                Some((now, injector)) => injector.judge(*now, from, to, payload),
+                None => Verdict::Delivered { after_s: 0.0, again_after_s: None, damage: None },
             }
         };
         let Verdict::Delivered { after_s, again_after_s, damage } = verdict else { return Vec::new() };
@@ -82,17 +78,16 @@ impl Faults {
 }
 
 impl<B: Bus> FaultyBus<B> {
-    /// Faults around the bus of a robot. Second 0 of the plan is `origin`, or else the first instant that the robot
-    /// tells.
-    pub fn new(inner: B, robot: RobotId, plan: FaultPlan, seed: u64, origin: Option<Timestamp>) -> Self {
-        let state = Mutex::new(State { plan, origin, now: None, injector: None });
+    /// Faults around the bus of a robot. Second 0 of the plan is the first instant that the robot tells.
+    pub fn new(inner: B, robot: RobotId, plan: FaultPlan, seed: u64) -> Self {
+        let state = Mutex::new(State { plan, begun: None });
         Self { inner, faults: Arc::new(Faults { robot, seed, state }) }
     }
 
     /// Changes the plan; what is under way stays so.
     pub fn set_plan(&self, plan: FaultPlan) {
         let mut state = self.faults.state();
-        if let Some(injector) = &mut state.injector {
+        if let Some((_, injector)) = &mut state.begun {
             injector.set_plan(plan.clone());
         }
         state.plan = plan;
@@ -190,11 +185,10 @@ impl<B: Bus> Bus for FaultyBus<B> {
 
     fn team_time(&self, now: Timestamp) {
         let mut state = self.faults.state();
-        if state.injector.is_none() {
-            let origin = state.origin.unwrap_or(now);
-            state.injector = Some(Injector::new(state.plan.clone(), self.faults.seed, origin));
-        }
-        state.now = state.now.max(Some(now));
+        let state = &mut *state;
+        let fresh = || (now, Injector::new(state.plan.clone(), self.faults.seed, now));
+        let (last, _) = state.begun.get_or_insert_with(fresh);
+        *last = now.max(*last);
         self.inner.team_time(now);
     }
 }

@@ -26,7 +26,7 @@ impl Team {
     async fn new(text: &str) -> Self {
         let network = MemoryNetwork::new();
         let own = std::sync::Arc::new(network.join("two"));
-        let two = FaultyBus::new(own, RobotId(2), plan(text), 1, None);
+        let two = FaultyBus::new(own, RobotId(2), plan(text), 1);
         let heard = two.subscribe("pleiad/t/**").await.unwrap();
         Self { one: network.join("one"), two, three: network.join("three"), heard }
     }

@@ -136,3 +136,6 @@ fn whole(unit: &Unit<'_>, terms: &[Term], state: &State, term: &Term) -> Values 
     };
     unit.stretches.iter().map(part).collect()
 }
+
+#[cfg(test)]
+mod tests;

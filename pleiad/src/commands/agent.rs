@@ -20,7 +20,7 @@ pub fn run(args: &AgentArgs) -> anyhow::Result<()> {
         let outcome = match (config.fault_plan()?, &config.faults) {
             (Some(plan), Some(faults)) => {
                 tracing::warn!(plan = %faults.plan.display(), "messages of peers are lost and delayed on purpose");
-                let faulty = FaultyBus::new(bus.clone(), RobotId(config.robot), plan, faults.seed, None);
+                let faulty = FaultyBus::new(bus.clone(), RobotId(config.robot), plan, faults.seed);
                 pleiad_agent::driver::run(&config, &faulty, nonce, stopped()).await
             }
             _ => pleiad_agent::driver::run(&config, &bus, nonce, stopped()).await,

@@ -3,6 +3,7 @@
 use anyhow::bail;
 use pleiad_agent::config::FaultsSection;
 use pleiad_bus::FaultPlan;
+use pleiad_bus::faults::Fault;
 use pleiad_sim_peers::{Scenario, simulate};
 
 use super::replay::{command_line, text, write_run};
@@ -25,6 +26,12 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         let rules = FaultPlan::load(plan)?.rules;
         if rules.is_empty() {
             bail!("--faults {}: found no [[fault]] table; docs/faults.md lists their keys", plan.display());
+        }
+        if let Some(index) = rules.iter().position(|rule| matches!(rule.fault, Fault::Clock { .. })) {
+            bail!(
+                "{}: fault[{index}] is of a clock, which agent processes do not feign; remove it, or use pleiad faults",
+                plan.display()
+            );
         }
         for agent in team.agents.values_mut() {
             agent.faults = Some(FaultsSection { plan: plan.clone(), seed });

@@ -4,6 +4,7 @@ pub mod check;
 pub mod control;
 mod entry;
 mod estimate;
+pub mod membership;
 pub mod sample;
 pub mod snapshot;
 pub mod status;

@@ -8,7 +8,8 @@ use pleiad_estimation::{BootIndex, RobotId, Timestamp};
 use serde::{Deserialize, Serialize};
 
 use super::check::{self, WirePose, WireSymmetric};
-use super::entry::{WireEntry, WireId, WireLog, WireNoise, WireSeal, WireVote};
+use super::entry::{WireEntry, WireId, WireLog, WireNoise};
+use super::membership::{WireSeal, WireVote};
 use crate::codec::{self, Reader};
 use crate::error::ProtocolError;
 use crate::limits;

@@ -1,9 +1,11 @@
 //! One schedule from beginning to end.
 
-use std::collections::{BTreeMap, BTreeSet};
+mod agreement;
+mod processes;
+
+use std::collections::BTreeMap;
 
 use pleiad_agent::{Command, Event, Node, NodeConfig, Notice, Record, journal};
-use pleiad_estimation::fact::LogId;
 use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_protocol::{Message, limits};
 
@@ -91,21 +93,7 @@ struct Run<'a> {
 /// # Errors
 /// The first invariant that did not hold.
 pub fn run(seed: u64, options: &Options) -> Result<Outcome, Violation> {
-    let plan = Plan::new(seed, options);
-    let world = World::new(seed, plan.robots);
-    let mut run = Run {
-        options,
-        now: Timestamp(0),
-        network: Network::new(Chance::new(seed, 3), plan.weather),
-        world,
-        robots: BTreeMap::new(),
-        due: BTreeMap::new(),
-        count: 0,
-        chance: Chance::new(seed, 4),
-        checks: Checks::new(plan.robots),
-        outcome: Outcome { robots: plan.robots, ..Outcome::default() },
-        plan,
-    };
+    let mut run = Run::new(seed, Plan::new(seed, options), options);
     run.set_up()?;
     run.live()?;
     run.heal()?;
@@ -144,19 +132,8 @@ pub fn operate(robots: u32, hours: f64, mut report: impl FnMut(Hour)) -> Result<
         weather,
         blows: Vec::new(),
     };
-    let mut run = Run {
-        options: &options,
-        now: Timestamp(0),
-        network: Network::new(Chance::new(1, 3), weather),
-        world: World::new(1, robots),
-        robots: BTreeMap::new(),
-        due: BTreeMap::new(),
-        count: 0,
-        chance: Chance::new(1, 4),
-        checks: Checks::new(robots).for_long(),
-        outcome: Outcome::default(),
-        plan,
-    };
+    let mut run = Run::new(1, plan, &options);
+    run.checks = Checks::new(robots).for_long();
     run.set_up()?;
     let steps = (hours * 4.0).ceil();
     let mut step = 0.0;
@@ -176,7 +153,24 @@ pub fn operate(robots: u32, hours: f64, mut report: impl FnMut(Hour)) -> Result<
     Ok(())
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
+    /// A team that has not begun.
+    fn new(seed: u64, plan: Plan, options: &'a Options) -> Self {
+        Self {
+            options,
+            now: Timestamp(0),
+            network: Network::new(Chance::new(seed, 3), plan.weather),
+            world: World::new(seed, plan.robots),
+            robots: BTreeMap::new(),
+            due: BTreeMap::new(),
+            count: 0,
+            chance: Chance::new(seed, 4),
+            checks: Checks::new(plan.robots),
+            outcome: Outcome { robots: plan.robots, ..Outcome::default() },
+            plan,
+        }
+    }
+
     fn set_up(&mut self) -> Result<(), Violation> {
         for number in 1..=self.plan.robots {
             let robot = RobotId(number);
@@ -254,113 +248,6 @@ impl Run<'_> {
                 }
             }
             Due::Blow(blow) => self.strike(blow)?,
-        }
-        Ok(())
-    }
-
-    fn strike(&mut self, blow: Blow) -> Result<(), Violation> {
-        match blow {
-            Blow::Weather(weather) => self.network.weather = weather,
-            Blow::Partition(sides) => {
-                self.network.sides = Some((1..).map(RobotId).zip(sides).collect());
-            }
-            Blow::Heal => self.network.sides = None,
-            Blow::Kill { robot, commands, back_s } => {
-                if let Some(robot) = self.robots.get_mut(&RobotId(robot)) {
-                    robot.doomed = Some((commands, back_s));
-                }
-            }
-            Blow::PowerLoss { robot, back_s } => {
-                let robot = RobotId(robot);
-                self.checks.damages(robot);
-                if self.die(robot, back_s)
-                    && let Some(robot) = self.robots.get_mut(&robot)
-                {
-                    robot.disk.lose_power();
-                }
-            }
-            Blow::DiskLoss { robot, back_s } => {
-                let robot = RobotId(robot);
-                self.checks.damages(robot);
-                if self.die(robot, back_s)
-                    && let Some(robot) = self.robots.get_mut(&robot)
-                {
-                    robot.disk.erase();
-                }
-            }
-            Blow::DiskFull { robot, seconds } => {
-                let robot = RobotId(robot);
-                if let Some(robot) = self.robots.get_mut(&robot) {
-                    robot.disk.full = true;
-                }
-                self.after(seconds, Due::DiskFree(robot));
-            }
-            Blow::Evict { robot, at } => self.act(RobotId(at), Event::Evict(RobotId(robot)))?,
-        }
-        Ok(())
-    }
-
-    /// The process of a robot ends; `false` if it was not running.
-    fn die(&mut self, id: RobotId, back_s: f64) -> bool {
-        let Some(robot) = self.robots.get_mut(&id) else { return false };
-        robot.doomed = None;
-        let ran = robot.node.take().is_some();
-        if ran {
-            self.outcome.deaths += 1;
-            self.after(back_s, Due::Start(id));
-        }
-        ran
-    }
-
-    /// A process begins, from what it finds on its disk.
-    fn start(&mut self, id: RobotId) -> Result<(), Violation> {
-        let torn = self.chance.happens(0.5).then(|| self.chance.unit());
-        let nonce = self.chance.bits();
-        let Some(robot) = self.robots.get_mut(&id) else { return Ok(()) };
-        if robot.node.is_some() {
-            return Ok(());
-        }
-        let records = match robot.disk.found(torn) {
-            Ok(records) => records,
-            Err(error) => return Err(self.checks.violation(Some(id), error.to_string())),
-        };
-        // Who has lost his disk asks the others first; as long as not all are there who know, he waits.
-        let lived = records.iter().any(|record| matches!(record, Record::Sample(_) | Record::Tick { .. }));
-        let lost = self.now > Timestamp(0) && !lived;
-        let full = robot.disk.full;
-        let all = self.robots.iter().all(|(other, robot)| {
-            *other == id
-                || (robot.node.is_some() && self.network.connected(id, *other))
-                || (robot.node.is_none() && robot.disk.is_empty())
-        });
-        if full || (lost && !all) {
-            self.after(0.5, Due::Start(id));
-            return Ok(());
-        }
-        let Some(robot) = self.robots.get_mut(&id) else { return Ok(()) };
-        #[allow(unused_mut, reason = "a mistake may be planted")]
-        let mut node = Node::recover(robot.config.clone(), nonce, records);
-        #[cfg(feature = "planted")]
-        if let Some(planted) = self.options.planted {
-            node.plant(planted);
-        }
-        robot.node = Some(node);
-        if lost {
-            // What reached nobody was never said.
-            let others = self.robots.iter().filter(|(other, _)| **other != id);
-            let heard =
-                others.filter_map(|(_, robot)| robot.node.as_ref()).flat_map(|node| node.ledger().digests());
-            let heard: BTreeSet<LogId> =
-                heard.map(|digest| digest.log).filter(|log| log.robot == id).collect();
-            self.checks.unsaid(id, &heard);
-            let others: Vec<RobotId> = self.robots.keys().copied().filter(|other| *other != id).collect();
-            for other in others {
-                let status =
-                    self.robots.get_mut(&other).and_then(|robot| Some(robot.node.as_mut()?.status()));
-                if let Some(status) = status {
-                    self.act(id, Event::Status(status))?;
-                }
-            }
         }
         Ok(())
     }
@@ -499,89 +386,6 @@ impl Run<'_> {
                 return Err(self.checks.violation(Some(id), notice.to_string()));
             }
             _ => {}
-        }
-        Ok(())
-    }
-
-    /// Everything works again, and the team goes on for a while.
-    fn heal(&mut self) -> Result<(), Violation> {
-        self.network.sides = None;
-        self.network.weather = Weather { delay_s: 0.01, jitter_s: 0.01, ..Weather::default() };
-        self.due.retain(|_, due| !matches!(due, Due::Blow(_)));
-        for robot in self.robots.values_mut() {
-            robot.doomed = None;
-            robot.disk.full = false;
-        }
-        self.until(self.now.plus_seconds(HEALED_S))
-    }
-
-    /// The input ends, and the team must come to agree.
-    fn agree(&mut self) -> Result<(), Violation> {
-        self.due.retain(|_, due| !matches!(due, Due::Tick(_)));
-        let robots: Vec<RobotId> = self.robots.keys().copied().collect();
-        for robot in &robots {
-            self.act(*robot, Event::InputEnded)?;
-        }
-        for _ in 0..ROUNDS {
-            self.until(self.now.plus_seconds(STATUS_S))?;
-            if self.agreed() {
-                return self.judge(&robots);
-            }
-        }
-        let mut states = Vec::new();
-        for (id, robot) in &mut self.robots {
-            if let Some(node) = &mut robot.node {
-                let status = node.status();
-                let logs: Vec<String> = status
-                    .logs
-                    .iter()
-                    .map(|log| format!("{}.{}:{}", log.log.robot, log.log.boot, log.held))
-                    .collect();
-                states.push(format!(
-                    "robot {id}: estimate {}, {:?}, drained {}, {:?}, logs {}",
-                    status.estimate,
-                    status.facts,
-                    status.drained,
-                    status.closure,
-                    logs.join(" ")
-                ));
-            }
-        }
-        Err(self.checks.violation(None, format!("the team does not agree: {}", states.join("; "))))
-    }
-
-    fn agreed(&mut self) -> bool {
-        let mut statuses = self.robots.values_mut().filter_map(|robot| Some(robot.node.as_mut()?.status()));
-        let Some(first) = statuses.next() else { return false };
-        let fine = |status: &pleiad_protocol::Status| {
-            let member = status.closure.as_ref().is_none_or(|closure| closure.joining.is_none());
-            status.drained && status.facts.pending == 0 && member
-        };
-        let mut all = 1;
-        let same = statuses.all(|status| {
-            all += 1;
-            status.estimate == first.estimate && fine(&status)
-        });
-        same && fine(&first) && all == self.robots.len()
-    }
-
-    fn judge(&mut self, robots: &[RobotId]) -> Result<(), Violation> {
-        self.checks.snapshots()?;
-        let closing = self.plan.cell_s.is_some();
-        for id in robots {
-            let Some(robot) = self.robots.get_mut(id) else { continue };
-            let Some(node) = &mut robot.node else { continue };
-            let fold = robot.config.fold;
-            self.checks.node(node)?;
-            self.checks.settled(node, &fold)?;
-            // Nothing but the last two cells can be open, and what the others may still ask for.
-            let kept = node.ledger().kept();
-            if closing && kept > 300 * robots.len() {
-                return Err(self.checks.violation(Some(*id), format!("{kept} items are kept")));
-            }
-            let counts = node.ledger().counts();
-            self.outcome.facts = self.outcome.facts.max(counts.used);
-            self.outcome.expired = self.outcome.expired.max(counts.expired);
         }
         Ok(())
     }

@@ -71,6 +71,22 @@ fn a_file_that_is_not_there_is_named() {
 }
 
 #[test]
+fn faults_that_processes_cannot_have_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = folder.path().join("small.toml");
+    std::fs::write(&scenario, SCENARIO).unwrap();
+    let scenario = scenario.display().to_string();
+    for (faults, words) in [
+        ("[[fault]]\nwhat = 'cut'\n[[fault]]\nwhat = 'clock'\noffset_s = 0.1\n", "fault[1] is of a clock"),
+        ("[[falut]]\nwhat = 'cut'\n", "no [[fault]] table"),
+    ] {
+        std::fs::write(folder.path().join("faults.toml"), faults).unwrap();
+        let stderr = run(folder.path(), ["run", &scenario, "--faults", "faults.toml"]).failure();
+        assert!(stderr.contains(words) && stderr.contains("faults.toml"), "{stderr}");
+    }
+}
+
+#[test]
 fn what_is_wrong_with_position_fixes_is_said() {
     let form = "ROBOT@HZ:SIGMA_M";
     for wrong in ["1", "1@1.0", "x@1.0:0.3", "1@0:0.3", "1@1.0:-0.3", "1@nan:0.3", "1@1.0:0.3:4"] {
