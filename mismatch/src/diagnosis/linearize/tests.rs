@@ -64,7 +64,8 @@ fn requests(units: &[&Unit<'_>]) -> Vec<Request> {
             requests.push(Request { term: Term::new(effect, whose, values), along: start.along });
         }
     }
-    for onset_s in [10.4, 21.7] {
+    // Where windows meet a push is split between them.
+    for onset_s in [10.0, 21.0] {
         let term = Term::new(Effect::Push, Whose::Robot(RobotId(1)), vec![onset_s, 0.0, 0.0, 0.0]);
         requests.push(Request { term, along: vec![1, 2, 3] });
     }
