@@ -3,6 +3,7 @@
 mod checks;
 mod model;
 mod sections;
+mod strategy_name;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,6 +13,7 @@ use pleiad_estimation::fact::{ClockMap, Noise};
 use pleiad_estimation::fold::FoldConfig;
 use pleiad_estimation::ledger::Closure;
 use pleiad_estimation::motion::MotionModel;
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use pleiad_protocol::TeamName;
 use pleiad_recording::RecordingError;
@@ -22,7 +24,7 @@ pub use model::RobotCorrection;
 pub use sections::{
     AngleNoise, BusMode, BusSection, ClockSection, ErrorName, FaultsSection, FilterSection, LandmarkRow,
     LedgerSection, LengthNoise, MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise,
-    SensorsSection, Strategy, VelocityName, YawName,
+    SensorsSection, VelocityName, YawName,
 };
 
 /// Why a configuration cannot be used.
@@ -87,9 +89,9 @@ pub struct AgentConfig {
     pub team: String,
     /// The robot's number.
     pub robot: u32,
-    /// How observations of other robots are used.
-    #[serde(default)]
-    pub strategy: Strategy,
+    /// How the robots of a team share what they see; all but `factored`.
+    #[serde(default, with = "strategy_name")]
+    pub strategy: StrategyKind,
     /// A model of the team's robots, such as a `corrected.toml`; what it says beyond `[motion]` and
     /// `[sensors]` is taken out of every reading. Relative to the file it is read from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -141,8 +143,8 @@ pub struct Prior {
 pub struct NodeConfig {
     /// Who.
     pub robot: RobotId,
-    /// How observations of other robots are used.
-    pub strategy: Strategy,
+    /// How the robots of a team share what they see.
+    pub strategy: StrategyKind,
     /// What decides bits.
     pub fold: FoldConfig,
     /// Where the robot starts.
@@ -248,6 +250,7 @@ impl AgentConfig {
         positive("bus.status_period_s", self.bus.status_period_s)?;
         not_negative("output.fsync_period_s", self.output.fsync_period_s)?;
         self.sensors.check()?;
+        self.check_strategy()?;
         let correction = self.correction()?;
         let mut sensors = self.sensors.clone();
         let mut model = motion.checked()?;

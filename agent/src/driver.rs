@@ -12,6 +12,7 @@ use std::time::Duration;
 use pleiad_bus::{Bus, BusError, Incoming, Query};
 use pleiad_estimation::RobotId;
 use pleiad_estimation::fact::Entry;
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_protocol::keys::{self, Kind};
 use pleiad_protocol::{
     ControlReply, ControlRequest, FactsRequest, Message, SensorAck, SnapshotPart, SnapshotRequest, TeamName,
@@ -20,10 +21,11 @@ use publisher::Publisher;
 use tokio::sync::mpsc;
 use tokio::time::MissedTickBehavior;
 
-use crate::config::{AgentConfig, ConfigError};
+use crate::config::{AgentConfig, ConfigError, NodeConfig};
 use crate::journal::{self, Journal, JournalError};
-use crate::node::{Command, Event, Node, Notice, Record, SettledEstimate};
+use crate::node::{Command, Event, Notice, Record, SettledEstimate};
 use crate::results::{self, ResultsError};
+use crate::role::Role;
 
 /// How long a peer has to answer. For facts it is asked again at its next status.
 const ASK_TIMEOUT: Duration = Duration::from_secs(2);
@@ -45,6 +47,18 @@ pub enum DriverError {
     /// The results could not be written.
     #[error(transparent)]
     Results(#[from] ResultsError),
+    /// The journal is of another strategy.
+    #[error(
+        "{path}: found the journal of a robot of strategy {found}, expected that of {expected}; move it away to start anew, or set the strategy back"
+    )]
+    OtherStrategy {
+        /// Which file.
+        path: PathBuf,
+        /// What it holds.
+        found: &'static str,
+        /// What is configured.
+        expected: StrategyKind,
+    },
     /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
@@ -64,7 +78,7 @@ pub const JOURNAL: &str = "journal.bin";
 
 /// An agent's process, apart from its bus.
 struct Agent<'a, B: Bus> {
-    node: Node,
+    role: Role,
     journal: Option<Journal>,
     folder: Option<PathBuf>,
     publisher: Publisher<'a, B>,
@@ -90,6 +104,7 @@ struct Agent<'a, B: Bus> {
 struct Inputs {
     facts: mpsc::Receiver<Incoming>,
     statuses: mpsc::Receiver<Incoming>,
+    said: mpsc::Receiver<Incoming>,
     samples: mpsc::Receiver<Incoming>,
     batches: mpsc::Receiver<Query>,
     requests: mpsc::Receiver<Query>,
@@ -117,12 +132,13 @@ pub async fn run<B: Bus + Clone>(
     }
     let folder = config.output.directory.clone();
     let (journal, records) = open_journal(folder.as_ref())?;
-    let node = Node::recover(node_config, nonce, records);
-    let fresh = !node.has_lived();
+    check_records(&node_config, folder.as_ref(), &records)?;
+    let role = Role::recover(node_config, nonce, records);
+    let fresh = role.may_have_lived();
     let (answers_in, answers) = mpsc::channel(64);
     let (parts_in, parts) = mpsc::channel(8);
     let mut agent = Agent {
-        node,
+        role,
         journal,
         folder,
         publisher: Publisher::new(bus, team.clone(), robot),
@@ -161,9 +177,31 @@ fn open_journal(folder: Option<&PathBuf>) -> Result<(Option<Journal>, Vec<Record
     Ok((Some(journal), found.records))
 }
 
+/// The exact strategy's journal always has entries, that of another strategy never.
+fn check_records(
+    config: &NodeConfig,
+    folder: Option<&PathBuf>,
+    records: &[Record],
+) -> Result<(), DriverError> {
+    let exact = config.strategy == StrategyKind::Exact;
+    let found = records.iter().find_map(|record| match record {
+        Record::Entry(_) | Record::Tick { .. } | Record::Closed(_) | Record::Checkpoint(_) if !exact => {
+            Some("exact")
+        }
+        Record::Said(..) if exact => Some("pairwise, intersection, split_intersection or naive"),
+        _ => None,
+    });
+    match (found, folder) {
+        (Some(found), Some(folder)) => {
+            Err(DriverError::OtherStrategy { path: folder.join(JOURNAL), found, expected: config.strategy })
+        }
+        _ => Ok(()),
+    }
+}
+
 impl<B: Bus + Clone> Agent<'_, B> {
     fn key(&self, kind: Kind) -> String {
-        keys::of(&self.team, self.node.robot(), kind)
+        keys::of(&self.team, self.role.robot(), kind)
     }
 
     async fn listen(
@@ -174,7 +212,11 @@ impl<B: Bus + Clone> Agent<'_, B> {
         Ok(Inputs {
             facts: self.bus.subscribe(&keys::all(&self.team, Kind::Fact)).await?,
             statuses: self.bus.subscribe(&keys::all(&self.team, Kind::Status)).await?,
-            samples: self.bus.subscribe(&keys::sensors(&self.team, self.node.robot())).await?,
+            said: self
+                .bus
+                .subscribe(&keys::all(&self.team, Kind::Strategy { to: self.role.robot() }))
+                .await?,
+            samples: self.bus.subscribe(&keys::sensors(&self.team, self.role.robot())).await?,
             batches: self.bus.serve(&self.key(Kind::SensorBatch)).await?,
             requests: self.bus.serve(&self.key(Kind::Facts)).await?,
             control: self.bus.serve(&self.key(Kind::Control)).await?,
@@ -232,6 +274,9 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 incoming = inputs.facts.recv() => {
                     self.fact(incoming.ok_or(DriverError::Closed { what: "facts" })?).await?;
                 }
+                incoming = inputs.said.recv() => {
+                    self.said(incoming.ok_or(DriverError::Closed { what: "strategy" })?).await?;
+                }
                 Some((peer, entries)) = inputs.answers.recv() => {
                     self.asked.remove(&peer);
                     if let Some(entries) = entries {
@@ -257,7 +302,7 @@ impl<B: Bus + Clone> Agent<'_, B> {
                     self.batch(query.ok_or(DriverError::Closed { what: "batches" })?).await?;
                 }
                 _ = status_due.tick() => {
-                    let status = self.node.status();
+                    let status = self.role.status();
                     self.publisher.publish(Kind::Status, &Message::Status(status)).await;
                 }
                 _ = sync_due.tick() => {
@@ -271,12 +316,12 @@ impl<B: Bus + Clone> Agent<'_, B> {
 
     /// Handles an event and does what follows from it.
     async fn act(&mut self, event: Event) -> Result<(), DriverError> {
-        let commands = self.node.handle(event);
+        let commands = self.role.handle(event);
         self.execute(commands).await
     }
 
     async fn execute(&mut self, commands: Vec<Command>) -> Result<(), DriverError> {
-        let robot = self.node.robot();
+        let robot = self.role.robot();
         for command in commands {
             match command {
                 Command::Journal(records) => {
@@ -300,6 +345,11 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 }
                 Command::Ask { peer, request } => self.ask(peer, request),
                 Command::Notice(notice) => report(&notice),
+                Command::Say { to: Some(to), message } => {
+                    self.publisher.publish(Kind::Strategy { to }, &Message::Strategy(message)).await;
+                }
+                // Only `factored` speaks to everybody, which a configuration cannot choose.
+                Command::Say { to: None, .. } => {}
             }
         }
         Ok(())
@@ -309,7 +359,7 @@ impl<B: Bus + Clone> Agent<'_, B> {
     fn compact(&mut self) -> Result<(), DriverError> {
         let Some(journal) = &mut self.journal else { return Ok(()) };
         if journal.bytes() > 2 * self.compacted_bytes + SMALLEST_COMPACTION_BYTES {
-            journal.replace(&self.node.compacted())?;
+            journal.replace(&self.role.compacted())?;
             self.compacted_bytes = journal.bytes();
         }
         Ok(())
@@ -373,9 +423,9 @@ impl<B: Bus + Clone> Agent<'_, B> {
         }
         if let Some(folder) = &self.folder {
             let (messages, bytes) = self.publisher.sent();
-            let summary = results::summary(&mut self.node, messages, bytes);
+            let summary = self.role.summary(messages, bytes);
             let mut settled = self.settled.clone();
-            settled.extend(self.node.settled());
+            settled.extend(self.role.settled());
             results::write(folder, &settled, &self.online, &summary)?;
         }
         Ok(())

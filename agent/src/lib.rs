@@ -3,13 +3,18 @@
 //!
 //! Simulated, replayed and live runs differ in the driver alone.
 
+pub mod approximate;
 pub mod config;
 pub mod driver;
 pub mod journal;
 mod node;
 pub mod results;
+pub mod role;
 pub mod strategy;
 
+pub use approximate::Approximate;
 pub use config::{AgentConfig, ConfigError, NodeConfig};
-pub use node::{Command, Event, Node, Notice, Record, SampleRefusal, SettledEstimate};
+pub use node::{Command, Event, Node, Notice, Record, SettledEstimate};
+pub use pleiad_estimation::sample::SampleRefusal;
+pub use role::Role;
 pub use strategy::Participant;

@@ -15,7 +15,6 @@ mod views;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 pub use commands::{Command, Event, Notice, Record};
-pub use intake::SampleRefusal;
 pub use views::SettledEstimate;
 
 use closing::Membership;
@@ -24,7 +23,7 @@ use pleiad_estimation::fact::{Answer, Body, Entry, EntryId, Half, LogId, NoiseRe
 use pleiad_estimation::ledger::{Insertion, Ledger, Refusal};
 use pleiad_estimation::motion::DeadReckoning;
 use pleiad_estimation::nominal::Outside;
-use pleiad_estimation::sample::{Reading, Sample, Target};
+use pleiad_estimation::sample::{Reading, Sample, SampleRefusal, Tally, Target};
 use pleiad_estimation::{BootIndex, RobotId, Sequence, Timestamp};
 use pleiad_protocol::{FactsRequest, LogRange, Status};
 use segments::Segments;
@@ -53,7 +52,7 @@ pub struct Node {
     /// Own observations stamped after the last odometry, by time.
     waiting: VecDeque<Sample>,
     next_estimate: Option<i64>,
-    counts: intake::Counts,
+    counts: Tally,
     input_ended: bool,
     /// The highest boot of this robot that anyone is known to hold a log of.
     known_boot: Option<BootIndex>,
@@ -102,7 +101,7 @@ impl Node {
             boot: None,
             waiting: VecDeque::new(),
             next_estimate: None,
-            counts: intake::Counts::default(),
+            counts: Tally::default(),
             input_ended: false,
             known_boot: None,
             foreign: BTreeSet::new(),
@@ -129,6 +128,8 @@ impl Node {
             Event::InputEnded => self.end_input(),
             Event::SnapshotPart(peer, part) => self.snapshot_part(peer, &part),
             Event::Evict(robot) => self.evict(robot),
+            // Of an approximate strategy: nothing that a node could use.
+            Event::Said(..) => {}
         }
         self.advance();
         let Outbox { records, entries, rest } = std::mem::take(&mut self.out);

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, Pose2, Timestamp};
-use pleiad_protocol::Estimate;
+use pleiad_protocol::{Estimate, Status};
 use serde::{Deserialize, Serialize};
 
+use crate::approximate::Approximate;
 use crate::node::{Node, SettledEstimate};
 
 /// First line of the files of estimates.
@@ -58,7 +59,7 @@ pub enum ResultsError {
 pub struct AgentSummary {
     /// Who.
     pub robot: u32,
-    /// Hash of the bits of its final estimate of the whole team.
+    /// Hash of the bits of its final estimate of the whole team; of itself where the strategy is approximate.
     pub estimate: String,
     /// Complete relative observations known.
     pub facts_relative: u64,
@@ -100,6 +101,24 @@ pub fn online(estimate: &Estimate) -> SettledEstimate {
 /// Fills a summary from a node; messages and bytes are the driver's to know.
 pub fn summary(node: &mut Node, messages: u64, bytes: u64) -> AgentSummary {
     let status = node.status();
+    let refused = node.refusals().map(|(reason, count)| (reason.to_owned(), count)).collect();
+    AgentSummary { distance_m: node.distance_m(), samples_refused: refused, messages, bytes, ..of(&status) }
+}
+
+/// The same from a robot of an approximate strategy; the estimate is its own alone.
+pub fn approximate_summary(robot: &mut Approximate, messages: u64, bytes: u64) -> AgentSummary {
+    let status = robot.status();
+    AgentSummary {
+        estimate: robot.fingerprint().to_string(),
+        distance_m: robot.peer().distance_m(),
+        samples_refused: robot.peer().samples().reasons.clone(),
+        messages,
+        bytes,
+        ..of(&status)
+    }
+}
+
+fn of(status: &Status) -> AgentSummary {
     AgentSummary {
         robot: status.robot.0,
         estimate: status.estimate.to_string(),
@@ -110,11 +129,8 @@ pub fn summary(node: &mut Node, messages: u64, bytes: u64) -> AgentSummary {
         facts_pending: status.facts.pending,
         facts_void: status.facts.void,
         samples_accepted: status.samples.accepted,
-        samples_refused: node.refusals().map(|(reason, count)| (reason.to_owned(), count)).collect(),
-        messages,
-        bytes,
-        distance_m: node.distance_m(),
         boots: status.boot.0 + 1,
+        ..AgentSummary::default()
     }
 }
 

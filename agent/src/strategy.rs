@@ -1,5 +1,5 @@
 //! Every strategy behind one trait, speaking the messages of the wire: the exact one is the [`Node`], the
-//! others are [`Peer`]s.
+//! others are [`Approximate`].
 
 use std::collections::VecDeque;
 
@@ -8,12 +8,11 @@ use pleiad_estimation::joint::ErrorForm;
 use pleiad_estimation::motion::DeadReckoning;
 use pleiad_estimation::nominal::NominalTrajectory;
 use pleiad_estimation::sample::{Reading, Sample};
-use pleiad_estimation::strategy::{
-    self, Command, Counts, Event, Noises, Peer, Setup, Strategy, StrategyKind, View,
-};
+use pleiad_estimation::strategy::{Command, Counts, Event, Strategy, StrategyKind, View};
 use pleiad_estimation::{Pose2, RobotId};
 use pleiad_protocol::{Message, limits};
 
+use crate::approximate::Approximate;
 use crate::config::NodeConfig;
 use crate::node::{self, Node};
 
@@ -23,7 +22,7 @@ pub enum Participant {
     /// Folds facts.
     Exact(Box<Exact>),
     /// Follows an approximate strategy.
-    Approximate(Box<Peer>),
+    Approximate(Box<Approximate>),
 }
 
 /// A node, with its dead reckoning once more: what the whole team's estimate is carried on along.
@@ -34,31 +33,11 @@ pub struct Exact {
     trajectory: Option<NominalTrajectory>,
 }
 
-/// What a robot of an approximate strategy has to know, from the configuration of its agent. A model
-/// (`model = ...`) is not applied by these strategies.
-pub fn setup(config: &NodeConfig) -> Setup {
-    let [relative_pose, relative_position, range, bearing, range_bearing, position, heading] =
-        config.sensors.profiles();
-    Setup {
-        robot: config.robot,
-        motion: config.motion,
-        prior: config.prior.map(|prior| (prior.pose, prior.noise)),
-        noises: Noises { relative_pose, relative_position, range, bearing, range_bearing, position, heading },
-        range_bias_m: config.sensors.range_bias_m,
-        landmarks: config.landmarks.clone(),
-        gate: config.fold.gate,
-        clock: config.clock,
-        history_samples: config.history_samples,
-        longest_gap_s: config.longest_gap_s,
-        motion_limits: config.motion_limits,
-    }
-}
-
 impl Participant {
     /// A robot that has seen nothing; `nonce` as for [`Node::new`].
     pub fn new(kind: StrategyKind, config: NodeConfig, nonce: u64) -> Self {
-        match Peer::new(kind, setup(&config)) {
-            Some(peer) => Self::Approximate(Box::new(peer)),
+        match Approximate::new(kind, config.clone()) {
+            Some(approximate) => Self::Approximate(Box::new(approximate)),
             None => Self::Exact(Box::new(Exact {
                 reckoning: DeadReckoning::new(config.motion),
                 trajectory: None,
@@ -83,11 +62,19 @@ impl Participant {
         }
     }
 
+    /// The robot of an approximate strategy.
+    pub fn approximate_mut(&mut self) -> Option<&mut Approximate> {
+        match self {
+            Self::Exact(_) => None,
+            Self::Approximate(approximate) => Some(approximate),
+        }
+    }
+
     /// The nominal state at the last odometry.
     pub fn nominal(&self) -> Option<NominalState> {
         let trajectory = match self {
             Self::Exact(exact) => exact.trajectory.as_ref(),
-            Self::Approximate(peer) => peer.trajectory(),
+            Self::Approximate(approximate) => approximate.peer().trajectory(),
         };
         trajectory.map(|trajectory| trajectory.end().1)
     }
@@ -169,31 +156,32 @@ impl Strategy for Participant {
     type Message = Message;
 
     fn handle(&mut self, event: Event<Message>) -> Vec<Command<Message>> {
-        let peer = match self {
+        let approximate = match self {
             Self::Exact(exact) => return exact.handle(event),
-            Self::Approximate(peer) => peer,
+            Self::Approximate(approximate) => approximate,
         };
         let event = match event {
-            Event::Sample(sample) => Event::Sample(sample),
-            Event::Received { from, message: Message::Strategy(message) } => {
-                Event::Received { from, message }
+            Event::Sample(sample) => node::Event::Sample(sample),
+            Event::Received { from, message: Message::Strategy(message) } => node::Event::Said(from, message),
+            Event::InputEnded => node::Event::InputEnded,
+            // A message of another strategy; and nothing is repaired.
+            Event::Received { .. } | Event::Period => return Vec::new(),
+        };
+        let said = approximate.handle(event).into_iter().filter_map(|command| match command {
+            node::Command::Say { to: Some(to), message } => {
+                Some(Command::Send { to, message: Message::Strategy(message) })
             }
-            // A message of another strategy.
-            Event::Received { .. } => return Vec::new(),
-            Event::Period => Event::Period,
-            Event::InputEnded => Event::InputEnded,
-        };
-        let wire = |command: Command<strategy::Message>| match command {
-            Command::Send { to, message } => Command::Send { to, message: Message::Strategy(message) },
-            Command::Broadcast(message) => Command::Broadcast(Message::Strategy(message)),
-        };
-        peer.handle(event).into_iter().map(wire).collect()
+            node::Command::Say { to: None, message } => Some(Command::Broadcast(Message::Strategy(message))),
+            // Records, estimates and notices are no part of the exchange.
+            _ => None,
+        });
+        said.collect()
     }
 
     fn robot(&self) -> RobotId {
         match self {
             Self::Exact(exact) => exact.node.robot(),
-            Self::Approximate(peer) => peer.robot(),
+            Self::Approximate(approximate) => approximate.robot(),
         }
     }
 
@@ -209,14 +197,14 @@ impl Strategy for Participant {
                     row: std::collections::BTreeMap::new(),
                 })
             }
-            Self::Approximate(peer) => peer.view(),
+            Self::Approximate(approximate) => approximate.peer_mut().view(),
         }
     }
 
     fn counts(&mut self) -> Counts {
         match self {
             Self::Exact(exact) => exact.counts(),
-            Self::Approximate(peer) => peer.counts(),
+            Self::Approximate(approximate) => approximate.peer_mut().counts(),
         }
     }
 }

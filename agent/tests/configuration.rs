@@ -6,9 +6,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use pleiad_agent::config::{BusMode, ErrorName, Strategy, VelocityName, YawName};
+use pleiad_agent::config::{BusMode, ErrorName, VelocityName, YawName};
 use pleiad_agent::{AgentConfig, ConfigError};
 use pleiad_estimation::motion::DifferentialDrive;
+use pleiad_estimation::strategy::StrategyKind;
 use toml::{Table, Value};
 
 const DOCUMENT: &str = include_str!("../../docs/agent.md");
@@ -188,7 +189,8 @@ fn documented_names_are_the_names() {
             assert!(row.contains(&format!("`{name}`")), "{key}: {name}");
         }
     }
-    check("strategy", &[Strategy::Exact, Strategy::Independent]);
+    let strategies = StrategyKind::ALL.iter().filter(|kind| **kind != StrategyKind::Factored);
+    check("strategy", &strategies.map(|kind| kind.name()).collect::<Vec<_>>());
     check("filter.error", &[ErrorName::Invariant, ErrorName::Additive]);
     check("motion.yaw_source", &[YawName::Odometry, YawName::Gyro]);
     check("motion.velocity", &[VelocityName::Measured, VelocityName::Commanded]);

@@ -1,5 +1,9 @@
 //! What a robot's own sensors deliver: the input of an agent, of a recording and of a simulation.
 
+mod refusal;
+
+pub use refusal::{SampleRefusal, Tally};
+
 use crate::{LandmarkId, Pose2, RobotId, Timestamp};
 
 /// One reading of one sensor of one robot, stamped by that robot's clock.
@@ -9,6 +13,41 @@ pub struct Sample {
     pub time: Timestamp,
     /// What was read.
     pub reading: Reading,
+}
+
+impl Sample {
+    /// The sample with a known bias taken out of a range, m.
+    #[must_use]
+    pub fn without_range_bias(mut self, bias_m: f64) -> Self {
+        if let Reading::Sighting { relative, .. } = &mut self.reading
+            && let Relative::Range { range_m } | Relative::RangeBearing { range_m, .. } = relative
+        {
+            *range_m -= bias_m;
+        }
+        self
+    }
+
+    /// Numbers finite, ranges positive. Odometry is checked where it is used, against what came before.
+    ///
+    /// # Errors
+    /// [`SampleRefusal::BadValue`].
+    pub fn check(&self) -> Result<(), SampleRefusal> {
+        let range = |range_m: f64| range_m.is_finite() && range_m > 0.0;
+        let sound = match self.reading {
+            Reading::Gyro { yaw_rate_rad_s } => yaw_rate_rad_s.is_finite(),
+            Reading::Gps { x_m, y_m } => x_m.is_finite() && y_m.is_finite(),
+            Reading::Heading { heading_rad } => heading_rad.is_finite(),
+            Reading::Sighting { relative, .. } => match relative {
+                Relative::Pose(pose) => pose.is_finite(),
+                Relative::Position { x_m, y_m } => x_m.is_finite() && y_m.is_finite(),
+                Relative::Range { range_m } => range(range_m),
+                Relative::Bearing { bearing_rad } => bearing_rad.is_finite(),
+                Relative::RangeBearing { range_m, bearing_rad } => range(range_m) && bearing_rad.is_finite(),
+            },
+            Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_) => true,
+        };
+        if sound { Ok(()) } else { Err(SampleRefusal::BadValue { time: self.time }) }
+    }
 }
 
 /// The kinds of reading an agent accepts.

@@ -26,6 +26,7 @@ mod message;
 mod one_way;
 mod pairwise;
 mod peer;
+mod setup;
 mod view;
 
 use std::fmt;
@@ -34,7 +35,8 @@ use std::str::FromStr;
 pub use message::{
     Answer, Change, Gain, MeetingId, Message, Question, RowAnswer, Sighting, TeamUpdate, Verdict,
 };
-pub use peer::{Noises, Peer, Setup};
+pub use peer::Peer;
+pub use setup::{Noises, Setup};
 pub use view::{Deviation, Factor, JointView, View, error, joint_of_replica, joint_view};
 
 use crate::RobotId;
@@ -114,7 +116,7 @@ impl FromStr for StrategyKind {
 /// Something happened.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event<M> {
-    /// A sensor of this robot delivered, stamped by the robot's clock.
+    /// A sensor of this robot delivered, stamped in team time.
     Sample(Sample),
     /// A message arrived.
     Received {

@@ -79,9 +79,10 @@ pub struct RunArgs {
     /// Simulated seconds per second; as fast as the agents can if absent.
     #[arg(long)]
     pub speed: Option<f64>,
-    /// How the robots share what they see.
-    #[arg(long, value_enum, default_value_t = StrategyArg::Exact)]
-    pub strategy: StrategyArg,
+    /// How the robots share what they see: exact, pairwise, intersection, split_intersection, naive or
+    /// independent (docs/strategies.md).
+    #[arg(long, default_value_t = StrategyKind::Exact)]
+    pub strategy: StrategyKind,
     /// Coordinates of the filter's error.
     #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
     pub error: ErrorArg,
@@ -105,9 +106,10 @@ pub struct ReplayArgs {
     /// A recording folder, a run folder, or an MRCLAM folder. The robots of a run start as they were told
     /// then (priors.toml), others where the ground truth says.
     pub recording: PathBuf,
-    /// How the robots share what they see.
-    #[arg(long, value_enum, default_value_t = StrategyArg::Exact)]
-    pub strategy: StrategyArg,
+    /// How the robots share what they see: exact, pairwise, intersection, split_intersection, naive or
+    /// independent (docs/strategies.md).
+    #[arg(long, default_value_t = StrategyKind::Exact)]
+    pub strategy: StrategyKind,
     /// Coordinates of the filter's error.
     #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
     pub error: ErrorArg,
@@ -305,14 +307,6 @@ pub struct SimPeersArgs {
     /// Print the team time reached, a line per second of it.
     #[arg(long)]
     pub progress: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum StrategyArg {
-    /// The joint filter: every robot folds all facts.
-    Exact,
-    /// Observations of other robots are ignored.
-    Independent,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

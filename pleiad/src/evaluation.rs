@@ -29,8 +29,9 @@ pub struct RobotResult {
 /// What a run left behind.
 pub struct RunResult {
     pub robots: BTreeMap<RobotId, RobotResult>,
-    /// All facts, as one of the robots held them at the end (all the same, or it is said in `notes`).
-    pub ledger: Ledger,
+    /// All facts, as one of the robots held them at the end (all the same, or it is said in `notes`); `None`
+    /// where the strategy keeps none.
+    pub ledger: Option<Ledger>,
     pub notes: Vec<String>,
     /// Wall-clock seconds of the run itself.
     pub wall_s: f64,
@@ -41,8 +42,10 @@ pub struct RunResult {
 impl RunResult {
     /// All entries held.
     pub fn entries(&self) -> impl Iterator<Item = &Entry> + Clone {
-        let digests: Vec<_> = self.ledger.digests().map(|digest| digest.log).collect();
-        digests.into_iter().flat_map(|log| self.ledger.entries(log, 0))
+        self.ledger.iter().flat_map(|ledger| {
+            let logs: Vec<_> = ledger.digests().map(|digest| digest.log).collect();
+            logs.into_iter().flat_map(|log| ledger.entries(log, 0))
+        })
     }
 }
 

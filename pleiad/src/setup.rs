@@ -9,9 +9,10 @@ use anyhow::{Context, bail};
 use pleiad_agent::config::{
     AgentConfig, AngleNoise, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LedgerSection,
     LengthNoise, MotionSection, OutputSection, PriorSection, RangeBearingNoise, RobotCorrection,
-    SensorsSection, Strategy,
+    SensorsSection,
 };
 use pleiad_estimation::sample::{Reading, Sample};
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_physics::Drive;
 use pleiad_recording::{Recording, RobotRecording};
@@ -25,7 +26,7 @@ use serde::{Deserialize, Serialize};
 pub use beside::{MODEL, copy_model, write_beside};
 use beside::{model_for, priors_beside};
 
-use crate::cli::{AbsoluteArg, ErrorArg, LandmarksArg, StrategyArg};
+use crate::cli::{AbsoluteArg, ErrorArg, LandmarksArg};
 
 /// Truth is interpolated across holes up to this long.
 pub const TRUTH_GAP_S: f64 = 0.3;
@@ -66,6 +67,11 @@ pub struct Team {
 }
 
 impl Team {
+    /// The strategy that all its agents are to follow.
+    pub fn strategy(&self) -> anyhow::Result<StrategyKind> {
+        Ok(self.agents.values().next().context("the team has no robot")?.strategy)
+    }
+
     /// First and last sample.
     pub fn span(&self) -> Option<(Timestamp, Timestamp)> {
         let times = self.samples.values().flatten().map(|sample| sample.time);
@@ -76,18 +82,11 @@ impl Team {
 /// How the filter is to be run, from the command line.
 #[derive(Clone, Copy, Debug)]
 pub struct FilterArgs {
-    pub strategy: StrategyArg,
+    pub strategy: StrategyKind,
     pub error: ErrorArg,
 }
 
 impl FilterArgs {
-    fn strategy(self) -> Strategy {
-        match self.strategy {
-            StrategyArg::Exact => Strategy::Exact,
-            StrategyArg::Independent => Strategy::Independent,
-        }
-    }
-
     fn apply(self, filter: &FilterSection) -> FilterSection {
         let error = match self.error {
             ErrorArg::Invariant => ErrorName::Invariant,
@@ -106,7 +105,7 @@ fn configuration(
     AgentConfig {
         team: "pleiad".to_owned(),
         robot: robot.0,
-        strategy: filter.strategy(),
+        strategy: filter.strategy,
         filter: filter.apply(&noise.filter),
         model: None,
         prior: None,

@@ -2,8 +2,9 @@
 //!
 //! `pleiad/<team>/<robot>/...` with, for each robot: `fact`, `estimate`, `status` (published by it),
 //! `sensor/{odometry,wheels,gyro,gps,heading,relative}` (single samples published to it),
-//! `sensor/batch` (asked of it: acknowledged batches), `facts`, `snapshot`, `control` (asked of it), and
-//! `alive` (its liveliness token). A robot is written as its number.
+//! `sensor/batch` (asked of it: acknowledged batches), `facts`, `snapshot`, `control` (asked of it), `alive`
+//! (its liveliness token), and `strategy/<robot>` (published by it for one other robot alone). A robot is
+//! written as its number.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,6 +16,8 @@ use crate::error::KeyError;
 
 /// First segment of every key.
 const ROOT: &str = "pleiad";
+/// First segment after the robot of what an approximate strategy says.
+const STRATEGY: &str = "strategy";
 /// Longest team name.
 const TEAM_CHARACTERS: usize = 32;
 
@@ -107,6 +110,11 @@ pub enum Kind {
     Fact,
     /// The robot's estimate of itself.
     Estimate,
+    /// What it says to one other robot, of an approximate strategy.
+    Strategy {
+        /// To whom.
+        to: RobotId,
+    },
     /// Its periodic status, which doubles as the digest of what it holds.
     Status,
     /// A single sample for it.
@@ -124,7 +132,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them.
+    /// All that have one key per robot.
     pub const ALL: [Self; 14] = [
         Self::Fact,
         Self::Estimate,
@@ -142,26 +150,31 @@ impl Kind {
         Self::Alive,
     ];
 
-    /// The segments after the robot; for sensors, the last of two.
-    const fn tail(self) -> (bool, &'static str) {
+    /// The segment after the robot.
+    const fn first_segment(self) -> &'static str {
         match self {
-            Self::Fact => (false, "fact"),
-            Self::Estimate => (false, "estimate"),
-            Self::Status => (false, "status"),
-            Self::Sensor(sensor) => (true, sensor.as_str()),
-            Self::SensorBatch => (true, "batch"),
-            Self::Facts => (false, "facts"),
-            Self::Snapshot => (false, "snapshot"),
-            Self::Control => (false, "control"),
-            Self::Alive => (false, "alive"),
+            Self::Fact => "fact",
+            Self::Estimate => "estimate",
+            Self::Strategy { .. } => STRATEGY,
+            Self::Status => "status",
+            Self::Sensor(_) | Self::SensorBatch => "sensor",
+            Self::Facts => "facts",
+            Self::Snapshot => "snapshot",
+            Self::Control => "control",
+            Self::Alive => "alive",
         }
     }
 }
 
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (of_sensor, last) = self.tail();
-        write!(f, "{}{last}", if of_sensor { "sensor/" } else { "" })
+        let first = self.first_segment();
+        match self {
+            Self::Sensor(sensor) => write!(f, "{first}/{}", sensor.as_str()),
+            Self::SensorBatch => write!(f, "{first}/batch"),
+            Self::Strategy { to } => write!(f, "{first}/{to}"),
+            _ => f.write_str(first),
+        }
     }
 }
 
@@ -196,12 +209,14 @@ impl FromStr for Key {
         let robot = parse_robot(robot)
             .ok_or_else(|| KeyError::Robot { key: key.to_owned(), found: robot.to_owned() })?;
         let tail = segments.next().ok_or_else(|| shape("a kind after the robot"))?;
-        let (of_sensor, last) = match tail.strip_prefix("sensor/") {
-            Some(last) => (true, last),
-            None => (false, tail),
+        let kind = match tail.split_once('/') {
+            Some((STRATEGY, to)) => parse_robot(to).map(|to| Kind::Strategy { to }),
+            _ => Kind::ALL.into_iter().find(|kind| kind.to_string() == tail),
         };
-        let kind = Kind::ALL.into_iter().find(|kind| kind.tail() == (of_sensor, last)).ok_or_else(|| {
-            shape("fact, estimate, status, sensor/<which>, facts, snapshot, control or alive")
+        let kind = kind.ok_or_else(|| {
+            shape(
+                "fact, estimate, strategy/<robot>, status, sensor/<which>, facts, snapshot, control or alive",
+            )
         })?;
         Ok(Self { team, robot, kind })
     }
@@ -244,13 +259,16 @@ mod tests {
         assert_eq!(key(Kind::Sensor(SensorKind::Gps)), "pleiad/blue-2_x/7/sensor/gps");
         assert_eq!(key(Kind::SensorBatch), "pleiad/blue-2_x/7/sensor/batch");
         assert_eq!(key(Kind::Alive), "pleiad/blue-2_x/7/alive");
+        assert_eq!(key(Kind::Strategy { to: RobotId(2) }), "pleiad/blue-2_x/7/strategy/2");
         assert_eq!(all(&team(), Kind::Status), "pleiad/blue-2_x/*/status");
+        assert_eq!(all(&team(), Kind::Strategy { to: RobotId(7) }), "pleiad/blue-2_x/*/strategy/7");
         assert_eq!(sensors(&team(), RobotId(7)), "pleiad/blue-2_x/7/sensor/*");
     }
 
     #[test]
     fn every_key_reads_back() {
-        for kind in Kind::ALL {
+        let strategy = [0, 17, u32::MAX].map(|to| Kind::Strategy { to: RobotId(to) });
+        for kind in Kind::ALL.into_iter().chain(strategy) {
             for robot in [0, 1, 10, u32::MAX] {
                 let key = Key { team: team(), robot: RobotId(robot), kind };
                 assert_eq!(key.to_string().parse(), Ok(key));
@@ -271,8 +289,12 @@ mod tests {
         for key in ["", "pleiad", "pleiad/t", "pleiad/t/1", "other/t/1/fact", "pleiad/t/1/fact/x"] {
             assert!(matches!(refused(key), KeyError::Shape { .. }), "{key}");
         }
+        for to in ["01", "", "*", "x", "1/2"] {
+            assert!(matches!(refused(&format!("pleiad/t/1/strategy/{to}")), KeyError::Shape { .. }), "{to}");
+        }
         for key in [
             "pleiad/t/1/",
+            "pleiad/t/1/strategy",
             "pleiad/t/1/gps",
             "pleiad/t/1/sensor/fact",
             "pleiad/t/1/sensor",

@@ -177,8 +177,11 @@ impl Fleet {
                         member.notices.push(notice);
                     }
                 }
-                // Nothing dies here, so nothing needs to be remembered.
-                Command::Journal(_) | Command::Closed { .. } | Command::AskSnapshot { .. } => {}
+                // Nothing dies here, so nothing needs to be remembered; a node is of the exact strategy.
+                Command::Journal(_)
+                | Command::Closed { .. }
+                | Command::AskSnapshot { .. }
+                | Command::Say { .. } => {}
             }
         }
     }

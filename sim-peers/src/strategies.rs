@@ -64,10 +64,8 @@ pub struct StrategyOutcome {
     pub snapshots: Vec<Snapshot>,
     /// What they believed once all was settled.
     pub last: Snapshot,
-    /// Messages sent, one per publication whatever the number of receivers.
-    pub messages: u64,
-    /// Their bytes.
-    pub bytes: u64,
+    /// Messages each robot sent, one per publication whatever the number of receivers, and their bytes.
+    pub sent: BTreeMap<RobotId, (u64, u64)>,
     /// Messages that the codec refused on arrival.
     pub refused_messages: u64,
     /// What the network did.
@@ -75,6 +73,14 @@ pub struct StrategyOutcome {
     /// Whether the robots of the exact strategy held the same facts at the end, and nothing was open; true
     /// for the others.
     pub agreed: bool,
+}
+
+impl StrategyOutcome {
+    /// Messages and bytes of the whole team.
+    pub fn total(&self) -> (u64, u64) {
+        let sum = |(messages, bytes): (u64, u64), sent: &(u64, u64)| (messages + sent.0, bytes + sent.1);
+        self.sent.values().fold((0, 0), sum)
+    }
 }
 
 struct Run {
@@ -87,8 +93,7 @@ struct Run {
     read: BTreeMap<RobotId, Timestamp>,
     /// Observations of `factored` that wait for everyone's odometry, in the order of time.
     held: VecDeque<(Timestamp, RobotId, Sample)>,
-    messages: u64,
-    bytes: u64,
+    sent: BTreeMap<RobotId, (u64, u64)>,
     refused_messages: u64,
 }
 
@@ -123,8 +128,7 @@ pub fn run(
         origin,
         read: BTreeMap::new(),
         held: VecDeque::new(),
-        messages: 0,
-        bytes: 0,
+        sent: BTreeMap::new(),
         refused_messages: 0,
     };
     let mut snapshots = Vec::new();
@@ -153,8 +157,7 @@ pub fn run(
         participants: run.participants,
         snapshots,
         last,
-        messages: run.messages,
-        bytes: run.bytes,
+        sent: run.sent,
         refused_messages: run.refused_messages,
         agreed,
     })
@@ -207,8 +210,9 @@ impl Run {
                 }
             };
             let bytes = message.encode();
-            self.messages += 1;
-            self.bytes += bytes.len() as u64;
+            let (sent, length) = self.sent.entry(robot).or_default();
+            *sent += 1;
+            *length += bytes.len() as u64;
             for receiver in receivers {
                 self.network.send(now, robot, receiver, bytes.clone());
             }

@@ -11,7 +11,7 @@ use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
 use pleiad_agent::config::{
-    AgentConfig, BusSection, ClockSection, FilterSection, LedgerSection, OutputSection, Strategy,
+    AgentConfig, BusSection, ClockSection, FilterSection, LedgerSection, OutputSection,
 };
 use pleiad_agent::journal::Journal;
 use pleiad_agent::{Record, driver};
@@ -20,6 +20,7 @@ use pleiad_coordinator::{AgentEntry, Backoff, CoordinatorConfig, Restart, differ
 use pleiad_estimation::fact::Entry;
 use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::sample::Sample;
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{Pose2, RobotId};
 use pleiad_protocol::keys::{self, Kind};
 use pleiad_protocol::{ControlReply, ControlRequest, Message, Status, TeamName};
@@ -125,7 +126,7 @@ impl Stage {
         AgentConfig {
             team: self.team.to_string(),
             robot: robot.0,
-            strategy: Strategy::Exact,
+            strategy: StrategyKind::Exact,
             filter: FilterSection::default(),
             model: None,
             prior: self.run.priors.get(&robot).map(agents::prior),

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 use pleiad_agent::NodeConfig;
 use pleiad_agent::config::{
-    AgentConfig, BusSection, ClockSection, FilterSection, LandmarkRow, LedgerSection, OutputSection, Strategy,
+    AgentConfig, BusSection, ClockSection, FilterSection, LandmarkRow, LedgerSection, OutputSection,
 };
 use pleiad_estimation::fact::Entry;
 use pleiad_estimation::fold::{FoldConfig, fold};
@@ -18,6 +18,7 @@ use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::motion::{DeadReckoning, Step};
 use pleiad_estimation::nominal::NominalTrajectory;
 use pleiad_estimation::sample::{Reading, Sample};
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_sim_peers::agents;
 use pleiad_sim_peers::scenario::RobotSettings;
@@ -101,7 +102,7 @@ impl Team {
             let config = AgentConfig {
                 team: "simulated".to_owned(),
                 robot: robot.0,
-                strategy: Strategy::Exact,
+                strategy: StrategyKind::Exact,
                 filter: FilterSection::default(),
                 model: None,
                 prior: world.priors.get(robot).map(agents::prior),

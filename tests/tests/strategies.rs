@@ -113,7 +113,7 @@ fn bytes_per_observation(kind: StrategyKind, robots: u32) -> f64 {
     let outcome = outcome(&team, kind);
     let observed: usize = team.world.recording.robots.values().map(|robot| robot.sightings.len()).sum();
     // Digests of the exact strategy are a matter of time and not of observations.
-    outcome.bytes as f64 / observed as f64
+    outcome.total().1 as f64 / observed as f64
 }
 
 #[test]

@@ -6,13 +6,46 @@ use pleiad_estimation::fact::{ClockMap, Noise};
 use pleiad_estimation::ledger::Closure;
 use pleiad_estimation::motion::{DifferentialDrive, MotionModel, MotionNoise, YawSource};
 use pleiad_estimation::sample::Relative;
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 
 use super::sections::{
-    AngleNoise, ClockSection, LedgerSection, LengthNoise, MotionSection, PriorSection, SensorsSection,
-    YawName,
+    AngleNoise, ClockSection, ErrorName, LedgerSection, LengthNoise, MotionSection, PriorSection,
+    SensorsSection, YawName,
 };
-use super::{ClosingConfig, ConfigError, Prior};
+use super::{AgentConfig, ClosingConfig, ConfigError, Prior};
+
+impl AgentConfig {
+    /// What only the exact strategy knows of must not be asked of another one.
+    pub(super) fn check_strategy(&self) -> Result<(), ConfigError> {
+        let alone = "its default: exact alone has it; remove it, or set strategy = \"exact\"";
+        let refused = |key: &str, found: String| {
+            Err(ConfigError::Value {
+                key: format!("{key} (strategy = \"{}\")", self.strategy),
+                found,
+                expected: alone,
+            })
+        };
+        match self.strategy {
+            StrategyKind::Exact => Ok(()),
+            StrategyKind::Factored => Err(ConfigError::Value {
+                key: "strategy".to_owned(),
+                found: "\"factored\"".to_owned(),
+                expected: "exact, pairwise, intersection, split_intersection, naive or independent: factored needs \
+                           every message to reach everyone in one order, which no network gives; `pleiad faults` \
+                           runs it in memory",
+            }),
+            _ => match (&self.model, self.filter.error) {
+                (Some(model), _) => refused("model", format!("\"{}\"", model.display())),
+                (None, ErrorName::Additive) => refused("filter.error", "\"additive\"".to_owned()),
+                (None, ErrorName::Invariant) if !self.ledger.members.is_empty() => {
+                    refused("ledger.members", format!("{:?}", self.ledger.members))
+                }
+                (None, ErrorName::Invariant) => Ok(()),
+            },
+        }
+    }
+}
 
 impl PriorSection {
     pub(super) fn checked(&self) -> Result<Prior, ConfigError> {

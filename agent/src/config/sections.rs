@@ -6,17 +6,6 @@ use pleiad_estimation::fold::{DEFAULT_GATE, FoldConfig};
 use pleiad_estimation::joint::ErrorForm;
 use serde::{Deserialize, Serialize};
 
-/// How the robots of a team share what they see.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Strategy {
-    /// Every robot folds all facts: the joint filter, exactly.
-    #[default]
-    Exact,
-    /// Observations of other robots are ignored: the baseline.
-    Independent,
-}
-
 /// The error of a pose, as written in a configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

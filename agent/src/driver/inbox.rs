@@ -35,7 +35,7 @@ impl<B: Bus + Clone> Agent<'_, B> {
     /// The robot a key belongs to; `None` for this one, whose own publications come back.
     pub(super) fn sender(&self, key: &str) -> Option<RobotId> {
         let robot = key.parse::<keys::Key>().ok()?.robot;
-        (robot != self.node.robot()).then_some(robot)
+        (robot != self.role.robot()).then_some(robot)
     }
 
     pub(super) async fn status(&mut self, incoming: Incoming) -> Result<(), DriverError> {
@@ -48,6 +48,22 @@ impl<B: Bus + Clone> Agent<'_, B> {
             }
             Err(error) => {
                 tracing::warn!(sender = sender.0, %error, "status refused");
+                Ok(())
+            }
+        }
+    }
+
+    /// What a peer of an approximate strategy says to this robot.
+    pub(super) async fn said(&mut self, incoming: Incoming) -> Result<(), DriverError> {
+        let Some(sender) = self.sender(&incoming.key) else { return Ok(()) };
+        match Message::decode(&incoming.payload) {
+            Ok(Message::Strategy(message)) => self.act(Event::Said(sender, message)).await,
+            Ok(other) => {
+                tracing::warn!(sender = sender.0, kind = other.kind(), "not a message of a strategy");
+                Ok(())
+            }
+            Err(error) => {
+                tracing::warn!(sender = sender.0, %error, "a message of a strategy refused");
                 Ok(())
             }
         }
@@ -99,7 +115,7 @@ impl<B: Bus + Clone> Agent<'_, B> {
         for sample in batch.samples {
             // A sample that is taken is always journalled; one that is not never is.
             let mut taken = false;
-            for command in self.node.handle(Event::Sample(sample)) {
+            for command in self.role.handle(Event::Sample(sample)) {
                 match command {
                     Command::Journal(more) => {
                         taken |= more.iter().any(|record| matches!(record, Record::Sample(_)));
@@ -113,12 +129,11 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 ack.accepted += 1;
             } else {
                 ack.refused += 1;
-                let reason = || self.node.last_refusal().map(|refusal| refusal.to_string());
-                ack.first_refusal = ack.first_refusal.or_else(reason);
+                ack.first_refusal = ack.first_refusal.or_else(|| self.role.last_refusal());
             }
         }
         if batch.end {
-            rest.extend(self.node.handle(Event::InputEnded));
+            rest.extend(self.role.handle(Event::InputEnded));
         }
         // One write and one message for the whole batch, in the order that the rule asks for.
         let first = [Command::Journal(records), Command::Publish(entries)];
@@ -135,11 +150,11 @@ impl<B: Bus + Clone> Agent<'_, B> {
     pub(super) fn request(&mut self, query: Query) {
         match Message::decode(&query.payload) {
             Ok(Message::FactsRequest(request)) => {
-                let entries = self.node.serve(&request, limits::ENTRIES);
+                let entries = self.role.serve(&request, limits::ENTRIES);
                 self.publisher.reply(query, &Message::Entries(entries));
             }
             Ok(Message::SnapshotRequest(request)) => {
-                if let Some(part) = self.node.serve_snapshot(&request) {
+                if let Some(part) = self.role.serve_snapshot(&request) {
                     self.publisher.reply(query, &Message::SnapshotPart(part));
                 }
             }
@@ -155,13 +170,17 @@ impl<B: Bus + Clone> Agent<'_, B> {
             return Ok(false);
         };
         let (reply, end) = match request {
-            ControlRequest::Status => (ControlReply::Status(self.node.status()), false),
+            ControlRequest::Status => (ControlReply::Status(self.role.status()), false),
             ControlRequest::Finish => {
                 self.act(Event::InputEnded).await?;
                 self.finish()?;
                 (ControlReply::Accepted, false)
             }
             ControlRequest::Shutdown => (ControlReply::Accepted, true),
+            ControlRequest::Evict(_) if !self.role.has_members() => {
+                let reason = "a team that keeps no facts together has nobody to evict".to_owned();
+                (ControlReply::Refused(reason), false)
+            }
             ControlRequest::Evict(robot) => {
                 self.act(Event::Evict(robot)).await?;
                 (ControlReply::Accepted, false)

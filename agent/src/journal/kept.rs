@@ -3,8 +3,8 @@
 
 use pleiad_estimation::fact::NominalState;
 use pleiad_estimation::symmetric::Symmetric3;
-use pleiad_estimation::{BootIndex, Pose2, Timestamp};
-use pleiad_protocol::{ProtocolError, decode_checkpoint, encode_checkpoint};
+use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
+use pleiad_protocol::{Message, ProtocolError, decode_checkpoint, encode_checkpoint};
 
 use crate::node::Record;
 
@@ -13,6 +13,7 @@ const KEPT: u8 = 255;
 const TICK: u8 = 1;
 const CLOSED: u8 = 2;
 const CHECKPOINT: u8 = 3;
+const SAID: u8 = 4;
 
 pub(super) fn is_kept(bytes: &[u8]) -> bool {
     bytes.first() == Some(&KEPT)
@@ -39,6 +40,11 @@ pub(super) fn encode(record: &Record) -> Vec<u8> {
         Record::Checkpoint(checkpoint) => {
             bytes.push(CHECKPOINT);
             bytes.extend(encode_checkpoint(checkpoint));
+        }
+        Record::Said(from, message) => {
+            bytes.push(SAID);
+            bytes.extend(from.0.to_le_bytes());
+            bytes.extend(Message::Strategy(message.clone()).encode());
         }
         Record::Sample(_) | Record::Entry(_) => {}
     }
@@ -85,6 +91,13 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Record, ProtocolError> {
         }
         CLOSED => Record::Closed(numbers.time()?),
         CHECKPOINT => Record::Checkpoint(Box::new(decode_checkpoint(numbers.0)?)),
+        SAID => {
+            let from = RobotId(u32::from_le_bytes(numbers.take()?));
+            match Message::decode(numbers.0)? {
+                Message::Strategy(message) => Record::Said(from, message),
+                other => return Err(ProtocolError::OtherKind { found: other.kind(), expected: "strategy" }),
+            }
+        }
         found => return Err(ProtocolError::Kind { found }),
     })
 }

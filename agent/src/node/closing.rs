@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_estimation::fact::{Body, EntryId, Fingerprint, LogId, Seal, SealedLog};
 use pleiad_estimation::ledger::{Ledger, Log, Wish, rules};
+use pleiad_estimation::sample::{Sample, SampleRefusal};
 use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
 use pleiad_protocol::{ClosureStatus, Status};
 
 use super::transfer::Transfer;
-use super::{Command, Node, Notice, Record, SampleRefusal};
+use super::{Command, Node, Notice, Record};
 
 /// Hashes of own snapshots kept to be compared with those of peers.
 const MOST_HASHES: usize = 64;
@@ -89,11 +90,7 @@ impl Node {
 
     /// Odometry of a robot that is not of the team: it goes on by itself, so that nothing of its motion is
     /// unknown when it is admitted.
-    pub(super) fn reckon_alone(
-        &mut self,
-        sample: pleiad_estimation::sample::Sample,
-        gap: bool,
-    ) -> Result<(), SampleRefusal> {
+    pub(super) fn reckon_alone(&mut self, sample: Sample, gap: bool) -> Result<(), SampleRefusal> {
         if self.lived && !gap {
             self.reckon(sample)?;
             self.emit_estimate();

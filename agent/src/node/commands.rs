@@ -2,11 +2,12 @@
 
 use pleiad_estimation::fact::{Entry, EntryId, Fingerprint, LogId, NominalState};
 use pleiad_estimation::ledger::{Checkpoint, Refusal};
-use pleiad_estimation::sample::Sample;
+use pleiad_estimation::sample::{Sample, SampleRefusal};
+use pleiad_estimation::strategy;
 use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
 use pleiad_protocol::{Estimate, FactsRequest, SnapshotPart, SnapshotRequest, Status};
 
-use super::{SampleRefusal, SettledEstimate};
+use super::SettledEstimate;
 
 /// Something happened.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub enum Event {
     SnapshotPart(RobotId, SnapshotPart),
     /// An operator wants a robot that will not come back evicted.
     Evict(RobotId),
+    /// A peer said something of an approximate strategy.
+    Said(RobotId, strategy::Message),
 }
 
 /// Something is to be done, in the order given.
@@ -60,6 +63,13 @@ pub enum Command {
     Estimate(Estimate),
     /// Something an operator should know.
     Notice(Notice),
+    /// Say something of an approximate strategy.
+    Say {
+        /// To whom; to everybody if `None`, as `factored` does in memory.
+        to: Option<RobotId>,
+        /// What.
+        message: strategy::Message,
+    },
 }
 
 /// What is kept of a run: from the records of a journal, in order, a node recovers.
@@ -89,6 +99,8 @@ pub enum Record {
     Closed(Timestamp),
     /// A snapshot, of this robot or taken over from a peer: what came before is in it.
     Checkpoint(Box<Checkpoint>),
+    /// What a peer said, of an approximate strategy.
+    Said(RobotId, strategy::Message),
 }
 
 /// Something an operator should know.

@@ -2,11 +2,10 @@
 //! there is one.
 
 use pleiad_estimation::motion::{DeadReckoning, OdometryRefusal};
-use pleiad_estimation::sample::Sample;
+use pleiad_estimation::sample::{Sample, SampleRefusal};
 use pleiad_estimation::{BootIndex, Pose2, Timestamp};
 
-use super::intake::check_reading;
-use super::{Node, SampleRefusal};
+use super::Node;
 
 impl Node {
     /// The sample at the instant it is of, as far as the model knows.
@@ -71,7 +70,7 @@ impl Node {
         let landmarks = &self.config.landmarks;
         let sample = corrector.observation(sample, nominal, |landmark| landmarks.get(&landmark).copied());
         // A model far from the truth can make nonsense of a sound reading.
-        check_reading(&sample)?;
+        sample.check()?;
         Ok(sample)
     }
 }

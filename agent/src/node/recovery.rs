@@ -44,6 +44,8 @@ impl Node {
                     }
                 }
                 Record::Checkpoint(checkpoint) => node.resume(*checkpoint),
+                // Of an approximate strategy.
+                Record::Said(..) => {}
                 Record::Sample(sample) => {
                     node.relive(sample, &mut announced);
                     let boot = node.segments.last().map(|(boot, _)| boot);

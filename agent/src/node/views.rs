@@ -2,12 +2,13 @@
 
 use pleiad_estimation::Timestamp;
 use pleiad_estimation::ledger::FactCounts;
+use pleiad_estimation::sample::SampleRefusal;
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, Pose2};
 use pleiad_protocol::{Estimate, LogStatus, SampleCounts, Status};
 
+use super::Node;
 use super::segments::Segment;
-use super::{Node, SampleRefusal};
 
 /// One point of a settled trajectory: the estimate at a time on all facts up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -199,18 +199,6 @@ fn what_still_waits_when_the_input_ends_is_refused() {
 }
 
 #[test]
-fn an_independent_robot_makes_no_facts_of_other_robots_but_of_the_map() {
-    let mut config = agent(1);
-    config.strategy = pleiad_agent::config::Strategy::Independent;
-    let mut node = node_of(&config, 1);
-    drive(&mut node, 10.0, 11.0, 0.1);
-    assert!(feed(&mut node, sees(10.5, 2)).published.is_empty());
-    assert_eq!(observations(&feed(&mut node, gps(10.5)).published).len(), 1);
-    let landmark = sighting(10.5, Target::Landmark(LandmarkId(7)), Relative::Range { range_m: 5.0 });
-    assert_eq!(observations(&feed(&mut node, landmark).published).len(), 1);
-}
-
-#[test]
 fn a_known_range_bias_is_subtracted_from_ranges_and_from_nothing_else() {
     let mut config = agent(1);
     config.sensors.range_bias_m = 0.25;

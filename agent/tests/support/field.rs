@@ -1,7 +1,7 @@
 //! A team of agent processes, as tasks, on a network in memory, and what a test does with them.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "helpers of tests are tests")]
-#![allow(missing_docs, reason = "a fixture")]
+#![allow(missing_docs, dead_code, reason = "a fixture; not every test uses all of it")]
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -124,7 +124,7 @@ pub fn checked(commands: Vec<Command>) -> Handled {
             Command::Ask { peer, request } => handled.asked.push((peer, request)),
             Command::Estimate(estimate) => handled.estimates.push(estimate),
             Command::Notice(notice) => handled.notices.push(notice),
-            Command::Closed { .. } | Command::AskSnapshot { .. } => {}
+            Command::Closed { .. } | Command::AskSnapshot { .. } | Command::Say { .. } => {}
         }
     }
     handled

@@ -188,7 +188,8 @@ impl Net {
                 Command::Estimate(_)
                 | Command::Notice(_)
                 | Command::Closed { .. }
-                | Command::AskSnapshot { .. } => {}
+                | Command::AskSnapshot { .. }
+                | Command::Say { .. } => {}
             }
         }
         if self.crash.is_some_and(|crash| crash.robot == robot && self.frames(robot) == crash.frames) {

@@ -158,6 +158,16 @@ pub struct ClockMap {
     pub rate_ppb: i32,
 }
 
+impl ClockMap {
+    /// Team time of a local instant, kept within what a stamp can hold.
+    pub fn team_time(&self, local: Timestamp) -> Timestamp {
+        let since = i128::from(local.0) - i128::from(self.reference.0);
+        let drift = since * i128::from(self.rate_ppb) / 1_000_000_000;
+        let team = i128::from(local.0) + i128::from(self.offset_ns) + drift;
+        Timestamp(i64::try_from(team).unwrap_or(if team > 0 { i64::MAX } else { i64::MIN }))
+    }
+}
+
 /// Something was observed by the robot whose log this is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {

@@ -1,21 +1,22 @@
 //! A robot that follows an approximate strategy: dead reckoning, stamps and waiting are the same for all of
 //! them, what they do with a measurement is their [`Core`].
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeSet, VecDeque};
 use std::fmt::Debug;
 
 use super::block::Instant;
 use super::factored::Factored;
 use super::one_way::OneWay;
 use super::pairwise::Pairwise;
+use super::setup::Setup;
 use super::{Command, Counts, Event, MeetingId, Message, Strategy, StrategyKind, View};
-use crate::fact::{Absolute, ClockMap, Noise, Quantity};
+use crate::fact::{Absolute, Noise, Quantity};
 use crate::geometry::{Vector3, wrap_angle};
-use crate::motion::{DeadReckoning, MotionModel, Step};
-use crate::nominal::NominalTrajectory;
-use crate::sample::{Reading, Relative, Sample, Target};
+use crate::motion::{DeadReckoning, OdometryRefusal, Step};
+use crate::nominal::{NominalTrajectory, Outside};
+use crate::sample::{Reading, Relative, Sample, SampleRefusal, Tally, Target};
 use crate::symmetric::Symmetric3;
-use crate::{LandmarkId, Pose2, RobotId, Timestamp};
+use crate::{Pose2, RobotId, Timestamp};
 
 /// Observations or messages that may wait for odometry.
 const MOST_WAITING: usize = 4096;
@@ -29,7 +30,7 @@ const LATEST_S: f64 = 1.0;
 pub(super) type Out = Vec<Command<Message>>;
 
 /// The part in which the approximate strategies differ.
-pub(super) trait Core: Debug + Send {
+pub(super) trait Core: Debug + Send + Sync {
     /// The robot starts here.
     fn place(&mut self, at: &Instant, pose: &Pose2, noise: &Noise);
     /// A measurement of the robot against the map.
@@ -74,64 +75,6 @@ impl Seen {
     }
 }
 
-/// The noise of each kind of measurement; readings of a kind without are refused.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Noises {
-    /// Full relative pose.
-    pub relative_pose: Option<Noise>,
-    /// Relative position.
-    pub relative_position: Option<Noise>,
-    /// Range alone.
-    pub range: Option<Noise>,
-    /// Bearing alone.
-    pub bearing: Option<Noise>,
-    /// Range and bearing.
-    pub range_bearing: Option<Noise>,
-    /// Absolute position.
-    pub position: Option<Noise>,
-    /// Absolute heading.
-    pub heading: Option<Noise>,
-}
-
-impl Noises {
-    fn of(&self, relative: &Relative) -> Option<Noise> {
-        match relative {
-            Relative::Pose(_) => self.relative_pose,
-            Relative::Position { .. } => self.relative_position,
-            Relative::Range { .. } => self.range,
-            Relative::Bearing { .. } => self.bearing,
-            Relative::RangeBearing { .. } => self.range_bearing,
-        }
-    }
-}
-
-/// What a robot has to know of itself.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Setup {
-    /// Who.
-    pub robot: RobotId,
-    /// Dead reckoning.
-    pub motion: MotionModel,
-    /// Where it starts, with noise in the frame of the pose; without it the robot has no place in the map.
-    pub prior: Option<(Pose2, Noise)>,
-    /// How well it measures.
-    pub noises: Noises,
-    /// Known bias of every range reading, subtracted, m.
-    pub range_bias_m: f64,
-    /// The map, m.
-    pub landmarks: BTreeMap<LandmarkId, [f64; 2]>,
-    /// Gate on the normalized innovation squared by dimension, 1 to 3.
-    pub gate: [f64; 3],
-    /// Local clock to team time.
-    pub clock: ClockMap,
-    /// Odometry samples kept.
-    pub history_samples: usize,
-    /// A longer silence of the odometry counts as unknown motion, s.
-    pub longest_gap_s: f64,
-    /// Fastest possible motion: m/s, m/s, rad/s.
-    pub motion_limits: [f64; 3],
-}
-
 /// A robot that follows one of the approximate strategies.
 #[derive(Debug)]
 pub struct Peer {
@@ -145,7 +88,8 @@ pub struct Peer {
     messages: VecDeque<(Timestamp, RobotId, Message)>,
     ended: bool,
     refused: u64,
-    samples_refused: u64,
+    samples: Tally,
+    distance_m: f64,
 }
 
 impl Peer {
@@ -170,7 +114,8 @@ impl Peer {
             messages: VecDeque::new(),
             ended: false,
             refused: 0,
-            samples_refused: 0,
+            samples: Tally::default(),
+            distance_m: 0.0,
         })
     }
 
@@ -179,12 +124,40 @@ impl Peer {
         self.trajectory.as_ref()
     }
 
-    fn sample(&mut self, sample: Sample, out: &mut Out) {
-        let sample = Sample { time: team_time(&self.setup.clock, sample.time), ..sample };
-        let taken = match sample.reading {
+    /// What became of the samples.
+    pub fn samples(&self) -> &Tally {
+        &self.samples
+    }
+
+    /// Distance travelled by dead reckoning, m.
+    pub fn distance_m(&self) -> f64 {
+        self.distance_m
+    }
+
+    /// Whether there will be no more samples.
+    pub fn ended(&self) -> bool {
+        self.ended
+    }
+
+    /// Takes a sample stamped in team time; what follows from it is to be sent even if it is refused.
+    pub fn sample(&mut self, sample: Sample) -> (Result<(), SampleRefusal>, Vec<Command<Message>>) {
+        let mut out = Vec::new();
+        let taken = self.take(sample, &mut out);
+        match &taken {
+            Ok(()) => self.samples.accepted += 1,
+            Err(refusal) => {
+                self.samples.refuse(refusal);
+            }
+        }
+        (taken, out)
+    }
+
+    fn take(&mut self, sample: Sample, out: &mut Out) -> Result<(), SampleRefusal> {
+        match sample.reading {
             Reading::Gyro { yaw_rate_rad_s } => {
+                sample.check()?;
                 self.dead_reckoning.gyro(sample.time, yaw_rate_rad_s);
-                yaw_rate_rad_s.is_finite()
+                Ok(())
             }
             Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_) => {
                 self.odometry(sample, out)
@@ -192,39 +165,39 @@ impl Peer {
             Reading::Gps { .. } | Reading::Heading { .. } | Reading::Sighting { .. } => {
                 self.observation(sample, out)
             }
-        };
-        self.samples_refused += u64::from(!taken);
+        }
     }
 
-    fn odometry(&mut self, sample: Sample, out: &mut Out) -> bool {
+    fn odometry(&mut self, sample: Sample, out: &mut Out) -> Result<(), SampleRefusal> {
         let end = self.trajectory.as_ref().map(|trajectory| trajectory.end().0);
+        if let Some(last) = end.filter(|last| sample.time <= *last) {
+            return Err(OdometryRefusal::OutOfOrder { time: sample.time, last }.into());
+        }
         match end {
-            Some(end) if sample.time <= end => return false,
             Some(end) if sample.time.seconds_since(end) > self.setup.longest_gap_s => {
                 self.dead_reckoning.restart(sample);
                 let gap_s = sample.time.seconds_since(end);
                 let [x, y, yaw] = self.setup.motion_limits.map(|limit| limit * gap_s * (limit * gap_s));
                 let covariance = Symmetric3::diagonal(x, y, yaw);
-                let step = Step { from: end, to: sample.time, motion: Vector3::zeros(), covariance };
-                if let Some(trajectory) = &mut self.trajectory {
-                    trajectory.extend(&step);
-                }
+                self.extend(&Step { from: end, to: sample.time, motion: Vector3::zeros(), covariance });
             }
-            _ => match self.dead_reckoning.odometry(sample) {
-                Err(_) => return false,
-                Ok(None) => self.begin(sample.time),
-                Ok(Some(step)) => {
-                    if let Some(trajectory) = &mut self.trajectory {
-                        trajectory.extend(&step);
-                    }
-                }
+            _ => match self.dead_reckoning.odometry(sample)? {
+                None => self.begin(sample.time),
+                Some(step) => self.extend(&step),
             },
         }
         self.catch_up(sample.time, out);
         if let Some(trajectory) = &self.trajectory {
             self.core.tick(trajectory, out);
         }
-        true
+        Ok(())
+    }
+
+    fn extend(&mut self, step: &Step) {
+        if let Some(trajectory) = &mut self.trajectory {
+            trajectory.extend(step);
+            self.distance_m += libm::hypot(step.motion[0], step.motion[1]);
+        }
     }
 
     fn begin(&mut self, time: Timestamp) {
@@ -246,8 +219,9 @@ impl Peer {
                 (None, None) => return,
                 (Some(own), other) if other.is_none_or(|other| own <= other) => {
                     if let Some(sample) = self.observations.pop_front() {
-                        let taken = self.observe(&sample, out);
-                        self.samples_refused += u64::from(!taken);
+                        if let Err(refusal) = self.observe(&sample, out) {
+                            self.samples.refuse_accepted(&refusal);
+                        }
                     }
                 }
                 _ => {
@@ -259,55 +233,70 @@ impl Peer {
         }
     }
 
-    fn observation(&mut self, mut sample: Sample, out: &mut Out) -> bool {
-        if let Reading::Sighting { relative, .. } = &mut sample.reading
-            && let Relative::Range { range_m } | Relative::RangeBearing { range_m, .. } = relative
-        {
-            *range_m -= self.setup.range_bias_m;
-        }
-        if !is_sound(&sample.reading) {
-            return false;
-        }
+    fn observation(&mut self, sample: Sample, out: &mut Out) -> Result<(), SampleRefusal> {
+        let sample = sample.without_range_bias(self.setup.range_bias_m);
+        sample.check()?;
         if self.trajectory.as_ref().is_some_and(|trajectory| sample.time <= trajectory.end().0) {
             return self.observe(&sample, out);
         }
-        if self.ended || self.observations.len() >= MOST_WAITING {
-            return false;
+        if self.ended {
+            return Err(SampleRefusal::AfterLastOdometry { time: sample.time });
+        }
+        if self.observations.len() >= MOST_WAITING {
+            return Err(SampleRefusal::TooManyWaiting { time: sample.time });
         }
         let place = self.observations.partition_point(|other| other.time <= sample.time);
         self.observations.insert(place, sample);
-        true
+        Ok(())
     }
 
     /// Uses an own observation that the odometry has reached.
-    fn observe(&mut self, sample: &Sample, out: &mut Out) -> bool {
-        let Some(Ok(state)) = self.trajectory.as_ref().map(|trajectory| trajectory.at(sample.time)) else {
-            return false;
-        };
-        let at = Instant { time: sample.time, state };
+    fn observe(&mut self, sample: &Sample, out: &mut Out) -> Result<(), SampleRefusal> {
+        let time = sample.time;
+        let trajectory = self.trajectory.as_ref().ok_or(SampleRefusal::BeforeBoot { time })?;
+        let state = trajectory.at(time).map_err(|outside| match outside {
+            Outside::Before => SampleRefusal::BeforeBoot { time },
+            Outside::Forgotten => SampleRefusal::TooOld { time },
+            Outside::After => SampleRefusal::AfterLastOdometry { time },
+        })?;
+        let at = Instant { time, state };
         let noises = &self.setup.noises;
-        let (quantity, noise) = match sample.reading {
+        let no_noise = |kind| SampleRefusal::NoNoise { kind };
+        match sample.reading {
             Reading::Gps { x_m, y_m } => {
-                (Quantity::Absolute(Absolute::Position([x_m, y_m])), noises.position)
+                let noise = noises.position.ok_or(no_noise("gps"))?;
+                let quantity = Quantity::Absolute(Absolute::Position([x_m, y_m]));
+                self.core.absolute(&at, &quantity, &noise, out);
             }
             Reading::Heading { heading_rad } => {
-                (Quantity::Absolute(Absolute::Heading(wrap_angle(heading_rad))), noises.heading)
+                let noise = noises.heading.ok_or(no_noise("heading"))?;
+                let quantity = Quantity::Absolute(Absolute::Heading(wrap_angle(heading_rad)));
+                self.core.absolute(&at, &quantity, &noise, out);
             }
-            Reading::Sighting { target: Target::Robot(robot), relative } if robot != self.setup.robot => {
-                let Some(noise) = noises.of(&relative) else { return false };
+            Reading::Sighting { target: Target::Robot(robot), relative } => {
+                if robot == self.setup.robot {
+                    return Err(SampleRefusal::Itself(robot));
+                }
+                let noise = noises.of(&relative)?;
                 self.core.sight(&at, robot, &relative, &noise, out);
-                return true;
             }
             Reading::Sighting { target: Target::Landmark(landmark), relative } => {
-                let Some(position_m) = self.setup.landmarks.get(&landmark) else { return false };
-                let quantity = Quantity::Landmark { landmark, position_m: *position_m, relative };
-                (quantity, noises.of(&relative))
+                let known = self.setup.landmarks.get(&landmark);
+                let position_m = *known.ok_or(SampleRefusal::UnknownLandmark(landmark))?;
+                if matches!(relative, Relative::Pose(_)) {
+                    return Err(SampleRefusal::LandmarkPose(landmark));
+                }
+                let noise = noises.of(&relative)?;
+                let quantity = Quantity::Landmark { landmark, position_m, relative };
+                self.core.absolute(&at, &quantity, &noise, out);
             }
-            _ => return false,
-        };
-        let Some(noise) = noise else { return false };
-        self.core.absolute(&at, &quantity, &noise, out);
-        true
+            // Odometry is no observation.
+            Reading::Velocity { .. }
+            | Reading::Wheels { .. }
+            | Reading::Increment(_)
+            | Reading::Gyro { .. } => {}
+        }
+        Ok(())
     }
 
     /// A message: at once, or when the odometry has reached the time it is about.
@@ -348,15 +337,16 @@ impl Strategy for Peer {
     fn handle(&mut self, event: Event<Message>) -> Out {
         let mut out = Vec::new();
         match event {
-            Event::Sample(sample) => self.sample(sample, &mut out),
+            Event::Sample(sample) => return self.sample(sample).1,
             Event::Received { from, message } => self.message(from, message, &mut out),
             // Nothing is repaired: that is what sets them apart from the exact strategy.
             Event::Period => {}
             Event::InputEnded => {
                 self.ended = true;
-                self.samples_refused += self.observations.len() as u64;
+                for sample in std::mem::take(&mut self.observations) {
+                    self.samples.refuse_accepted(&SampleRefusal::AfterLastOdometry { time: sample.time });
+                }
                 self.refused += self.messages.len() as u64;
-                self.observations.clear();
                 self.messages.clear();
             }
         }
@@ -377,35 +367,8 @@ impl Strategy for Peer {
         Counts {
             pending: counts.pending + (self.observations.len() + self.messages.len()) as u64,
             refused: counts.refused + self.refused,
-            samples_refused: self.samples_refused,
+            samples_refused: self.samples.refused,
             ..counts
-        }
-    }
-}
-
-/// Local to team time.
-fn team_time(clock: &ClockMap, local: Timestamp) -> Timestamp {
-    let since = i128::from(local.0) - i128::from(clock.reference.0);
-    let drift = since * i128::from(clock.rate_ppb) / 1_000_000_000;
-    let team = i128::from(local.0) + i128::from(clock.offset_ns) + drift;
-    Timestamp(i64::try_from(team).unwrap_or(if team > 0 { i64::MAX } else { i64::MIN }))
-}
-
-/// Numbers finite, ranges positive.
-fn is_sound(reading: &Reading) -> bool {
-    let range = |range_m: f64| range_m.is_finite() && range_m > 0.0;
-    match reading {
-        Reading::Gps { x_m, y_m } => x_m.is_finite() && y_m.is_finite(),
-        Reading::Heading { heading_rad } => heading_rad.is_finite(),
-        Reading::Sighting { relative, .. } => match relative {
-            Relative::Pose(pose) => pose.is_finite(),
-            Relative::Position { x_m, y_m } => x_m.is_finite() && y_m.is_finite(),
-            Relative::Range { range_m } => range(*range_m),
-            Relative::Bearing { bearing_rad } => bearing_rad.is_finite(),
-            Relative::RangeBearing { range_m, bearing_rad } => range(*range_m) && bearing_rad.is_finite(),
-        },
-        Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_) | Reading::Gyro { .. } => {
-            true
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::fact::{ClockMap, Noise, Quantity};
+use crate::fact::{Noise, Quantity};
 use crate::geometry::{Matrix3, Vector3};
 use crate::joint::ErrorForm;
 use crate::motion::{MotionModel, MotionNoise, YawSource};
@@ -65,7 +65,6 @@ fn setup(robot: RobotId) -> Setup {
         range_bias_m: 0.0,
         landmarks: BTreeMap::new(),
         gate: [f64::INFINITY; 3],
-        clock: ClockMap { reference: Timestamp(0), offset_ns: 0, rate_ppb: 0 },
         history_samples: 10_000,
         longest_gap_s: 2.0,
         motion_limits: [1.0, 1.0, 1.0],

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use pleiad_estimation::RobotId;
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_report::{DemoCase, DemoReport, demo_report, write_summary};
 use pleiad_sim_peers::{Scenario, connectivity, simulate};
 use serde::Serialize;
@@ -13,7 +14,7 @@ use serde::Serialize;
 use super::observability::of_run;
 use super::replay::{command_line, write_run};
 use super::runner::{self, Feeder, ProcessOptions};
-use crate::cli::{DemoArgs, ErrorArg, StrategyArg};
+use crate::cli::{DemoArgs, ErrorArg};
 use crate::evaluation::{self, RunResult};
 use crate::setup::{self, FilterArgs, Team};
 use crate::{folder, output};
@@ -111,7 +112,7 @@ fn run_case(args: &DemoArgs, name: &str, text: &str, out: &Path) -> anyhow::Resu
         .with_context(|| format!("cannot write {}", path.display()))?;
     let scenario = Scenario::load(&path)?;
     let world = simulate(&scenario, args.seed)?;
-    let filter = FilterArgs { strategy: StrategyArg::Exact, error: ErrorArg::Invariant };
+    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant };
     let mut team = setup::simulated(&scenario, world, filter);
     team.notes.extend(cut_off(&team));
     let options = ProcessOptions {
@@ -146,7 +147,7 @@ fn describe(
     };
     let early = sigma(EARLY_S.0, EARLY_S.1)?;
     let late = sigma(args.seconds - LATE_S, args.seconds)?;
-    let observability = of_run(&result);
+    let observability = of_run(&result)?;
     let last = |robot: &evaluation::RobotResult| {
         robot.settled.last().map_or(f64::NAN, |estimate| evaluation::position_sigma_m(&estimate.covariance))
     };
@@ -157,7 +158,7 @@ fn describe(
         .iter()
         .map(|score| score.settled.map_or(f64::NAN, |accuracy| accuracy.position_rmse_m))
         .collect();
-    let counts = result.ledger.counts();
+    let counts = result.ledger.as_ref().context("the demo's team keeps facts")?.counts();
     let (messages, bytes) = result.robots.values().fold((0, 0), |(messages, bytes), robot| {
         (messages + robot.summary.messages, bytes + robot.summary.bytes)
     });

@@ -2,15 +2,16 @@
 
 use std::fmt::Write as _;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use pleiad_estimation::RobotId;
 use pleiad_estimation::observability::{Observability, of_entries};
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_recording::ReadOptions;
 use pleiad_sim_peers::{Scenario, connectivity, simulate};
 use serde::Serialize;
 
 use super::runner;
-use crate::cli::{ErrorArg, LandmarksArg, ObservabilityArgs, StrategyArg};
+use crate::cli::{ErrorArg, LandmarksArg, ObservabilityArgs};
 use crate::evaluation::RunResult;
 use crate::output;
 use crate::setup::{self, FilterArgs, ReplayOptions, Team};
@@ -37,17 +38,18 @@ struct BoundsJson {
 }
 
 /// Observability of the facts of a run, linearized along the estimated trajectories.
-pub fn of_run(result: &RunResult) -> Observability {
+pub fn of_run(result: &RunResult) -> anyhow::Result<Observability> {
     let entries: Vec<_> = result.entries().cloned().collect();
-    let joint = result.ledger.joint();
-    of_entries(&entries, |robot: RobotId, boot, state| {
+    let joint =
+        result.ledger.as_ref().context("observability is that of facts, which only exact keeps")?.joint();
+    Ok(of_entries(&entries, |robot: RobotId, boot, state| {
         let member = joint.member(robot).filter(|member| member.boot == boot)?;
         Some(member.correction.compose(&state.nominal))
-    })
+    }))
 }
 
 pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
-    let filter = FilterArgs { strategy: StrategyArg::Exact, error: ErrorArg::Invariant };
+    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant };
     let team = if args.input.is_dir() {
         if args.seed.is_some() {
             bail!("--seed: a recording has none; it is for scenarios");
@@ -81,7 +83,7 @@ pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
         setup::simulated(&scenario, run, filter)
     };
     let result = runner::in_process(&team, "observing")?;
-    let json = describe(args, &of_run(&result), &team);
+    let json = describe(args, &of_run(&result)?, &team);
     output::print(args.json, &json, &text(&json))
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use pleiad_agent::SettledEstimate;
+use pleiad_agent::results::AgentSummary;
 use pleiad_estimation::Timestamp;
 use pleiad_recording::{IngestReport, ReadOptions, Recording, tum};
 use pleiad_report::{ReplayReport, RobotScore, replay_report, run_report, write_summary};
@@ -28,7 +29,8 @@ pub struct ReplayJson {
     pub online_mean_position_rmse_m: Option<f64>,
     pub facts: FactsJson,
     pub payload_bytes: PayloadJson,
-    pub nis: NisJson,
+    /// Of the joint filter, which only `exact` has.
+    pub nis: Option<NisJson>,
     pub seconds: SecondsJson,
     pub processes: usize,
     pub notes: Vec<String>,
@@ -60,7 +62,8 @@ pub struct FactsJson {
 
 #[derive(Debug, Serialize)]
 pub struct PayloadJson {
-    pub per_relative_observation: f64,
+    /// Of facts, which only `exact` has; `pleiad faults` counts for the others.
+    pub per_relative_observation: Option<f64>,
     pub total: u64,
 }
 
@@ -124,18 +127,19 @@ pub fn write_run(
         result.robots.iter().map(|(robot, own)| evaluation::score(*robot, own, &team.recording)).collect();
     let json = summary(&team.recording, result, &scores, (first, last), out, command, ingest);
     write_summary(&out.join("summary.json"), &json)?;
-    let (nis, facts) = evaluation::by_kind(&result.ledger, first);
-    let mut highlights = vec![
-        (
-            "payload of a relative observation".to_owned(),
-            format!("{:.0} bytes", json.payload_bytes.per_relative_observation),
-        ),
+    let kinds = result.ledger.as_ref().map(|ledger| evaluation::by_kind(ledger, first));
+    let (nis, facts) = kinds.unwrap_or_default();
+    let payload = json.payload_bytes.per_relative_observation;
+    let payload =
+        payload.map(|bytes| ("payload of a relative observation".to_owned(), format!("{bytes:.0} bytes")));
+    let mut highlights: Vec<_> = payload.into_iter().collect();
+    highlights.extend([
         ("all published bytes".to_owned(), json.payload_bytes.total.to_string()),
         (
             "wall-clock time".to_owned(),
             format!("{:.2} s for {:.0} s", json.seconds.wall, json.seconds.recorded),
         ),
-    ];
+    ]);
     if result.processes > 0 {
         highlights.push(("agent processes".to_owned(), result.processes.to_string()));
     }
@@ -166,7 +170,6 @@ fn summary(
     command: &str,
     ingest: Option<IngestReport>,
 ) -> ReplayJson {
-    let counts = result.ledger.counts();
     let robots = scores.iter().map(|score| RobotJson {
         robot: score.robot.0,
         position_rmse_m: score.settled.map(|accuracy| accuracy.position_rmse_m),
@@ -186,24 +189,51 @@ fn summary(
             score.dead_reckoning
         }),
         online_mean_position_rmse_m: evaluation::mean_position_rmse_m(scores.iter(), |score| score.online),
-        facts: FactsJson {
-            relative: counts.relative,
-            absolute: counts.absolute,
-            used: counts.used,
-            rejected: counts.rejected,
-            skipped: counts.skipped,
-            pending: counts.pending,
-            void: counts.void,
-        },
+        facts: facts(result),
         payload_bytes: PayloadJson {
-            per_relative_observation: payload::per_relative_observation(result.entries()),
+            per_relative_observation: result
+                .ledger
+                .as_ref()
+                .map(|_| payload::per_relative_observation(result.entries())),
             total: result.robots.values().map(|own| own.summary.bytes).sum(),
         },
-        nis: evaluation::nis(&result.ledger),
+        nis: result.ledger.as_ref().map(evaluation::nis),
         seconds: SecondsJson { recorded: last.seconds_since(first), wall: result.wall_s },
         processes: result.processes,
         notes: result.notes.clone(),
         ingest,
+    }
+}
+
+/// What became of the observations: as all robots know it, or as each counted its own.
+fn facts(result: &RunResult) -> FactsJson {
+    let Some(ledger) = &result.ledger else {
+        let sum = |count: fn(&AgentSummary) -> u64| -> usize {
+            result
+                .robots
+                .values()
+                .map(|robot| usize::try_from(count(&robot.summary)).unwrap_or(usize::MAX))
+                .sum()
+        };
+        return FactsJson {
+            relative: sum(|summary| summary.facts_relative),
+            absolute: sum(|summary| summary.facts_absolute),
+            used: sum(|summary| summary.facts_used),
+            rejected: sum(|summary| summary.facts_rejected),
+            skipped: 0,
+            pending: sum(|summary| summary.facts_pending),
+            void: 0,
+        };
+    };
+    let counts = ledger.counts();
+    FactsJson {
+        relative: counts.relative,
+        absolute: counts.absolute,
+        used: counts.used,
+        rejected: counts.rejected,
+        skipped: counts.skipped,
+        pending: counts.pending,
+        void: counts.void,
     }
 }
 
@@ -250,13 +280,14 @@ pub fn text(json: &ReplayJson) -> String {
         "facts: {} relative, {} absolute; {} used, {} rejected, {} skipped, {} pending, {} void",
         facts.relative, facts.absolute, facts.used, facts.rejected, facts.skipped, facts.pending, facts.void
     );
-    let _ = writeln!(
-        text,
-        "NIS per degree of freedom {:.2}, {:.1} % within the 95 % bound; {:.0} bytes per relative observation",
-        json.nis.mean,
-        100.0 * json.nis.within_95,
-        json.payload_bytes.per_relative_observation
-    );
+    if let (Some(nis), Some(bytes)) = (json.nis, json.payload_bytes.per_relative_observation) {
+        let _ = writeln!(
+            text,
+            "NIS per degree of freedom {:.2}, {:.1} % within the 95 % bound; {bytes:.0} bytes per relative observation",
+            nis.mean,
+            100.0 * nis.within_95,
+        );
+    }
     for note in &json.notes {
         let _ = writeln!(text, "note: {note}");
     }

@@ -10,13 +10,15 @@ use anyhow::{Context, bail};
 use pleiad_agent::config::{AgentConfig, BusSection};
 use pleiad_agent::journal::Journal;
 use pleiad_agent::results::{self, AgentSummary};
-use pleiad_agent::{Record, driver};
+use pleiad_agent::{Approximate, ConfigError, Event, NodeConfig, Record, driver};
 use pleiad_bus::{Bus, ZenohBus};
 use pleiad_coordinator::{AgentEntry, CoordinatorConfig, Restart, Team as Agents, endpoints};
 use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::sample::Sample;
+use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_recording::{Overwrite, Recording, RobotRecording, write_folder};
+use pleiad_sim_peers::strategies::{self, StrategyOptions};
 use pleiad_sim_peers::{Fleet, FleetOptions};
 use tokio::io::{AsyncBufReadExt, BufReader};
 
@@ -34,8 +36,37 @@ const ALIVE_WITHIN: Duration = Duration::from_mins(1);
 const SETTLED_WITHIN: Duration = Duration::from_mins(1);
 const ENDED_WITHIN: Duration = Duration::from_secs(30);
 
-/// Runs all nodes in this process.
+/// Runs all robots in this process.
 pub fn in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
+    match team.strategy()? {
+        StrategyKind::Exact => nodes_in_process(team, label),
+        kind => approximate_in_process(team, kind),
+    }
+}
+
+/// Runs all robots of an approximate strategy in this process, over a network without faults.
+fn approximate_in_process(team: &Team, kind: StrategyKind) -> anyhow::Result<RunResult> {
+    let began = Instant::now();
+    let configs = team.agents.iter().map(|(robot, agent)| Ok((*robot, agent.node()?)));
+    let configs = configs.collect::<Result<BTreeMap<_, _>, ConfigError>>()?;
+    // Nothing is looked at on the way: the robots keep their own estimates.
+    let options = StrategyOptions { look_every_s: 1e9, ..StrategyOptions::new(kind) };
+    let outcome = strategies::run(&configs, &team.samples, &options)?;
+    let mut notes = team.notes.clone();
+    let mut robots = BTreeMap::new();
+    for (robot, mut participant) in outcome.participants {
+        let Some(approximate) = participant.approximate_mut() else { continue };
+        let (messages, bytes) = outcome.sent.get(&robot).copied().unwrap_or_default();
+        let summary = results::approximate_summary(approximate, messages, bytes);
+        notes.extend(refusals(robot, &summary));
+        let settled = approximate.settled().to_vec();
+        robots.insert(robot, RobotResult { online: settled.clone(), settled, summary });
+    }
+    let wall_s = began.elapsed().as_secs_f64();
+    Ok(RunResult { robots, ledger: None, notes, wall_s, processes: 0 })
+}
+
+fn nodes_in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
     let configs = team.agents.values().map(AgentConfig::node).collect::<Result<_, _>>()?;
     let (first, last) = team.span().context("there is not a single sample to run on")?;
     let began = Instant::now();
@@ -66,7 +97,6 @@ pub fn in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
         ledger.get_or_insert_with(|| outcome.node.ledger().clone());
         robots.insert(robot, result);
     }
-    let ledger = ledger.context("the team has no robot")?;
     Ok(RunResult { robots, ledger, notes, wall_s: began.elapsed().as_secs_f64(), processes: 0 })
 }
 
@@ -257,41 +287,51 @@ fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult>
     for (robot, agent) in &team.agents {
         let folder = folder::agent(out, *robot);
         let records = Journal::read(&folder.join(driver::JOURNAL))?;
-        let mut own = Ledger::new(agent.node()?.fold);
-        let mut samples = Vec::new();
-        for record in records {
-            match record {
-                Record::Entry(entry) => {
-                    own.insert(entry);
-                }
-                Record::Sample(sample) => samples.push(sample),
-                // A run keeps all its facts, so that there is nothing closed in its journals.
-                _ => {}
-            }
-        }
+        let summary: AgentSummary = results::read_summary(&folder)?;
+        let samples = records.iter().filter_map(|record| match record {
+            Record::Sample(sample) => Some(*sample),
+            _ => None,
+        });
+        let mut samples: Vec<Sample> = samples.collect();
         samples.sort_by_key(|sample| sample.time);
         received.insert(*robot, samples);
-        let summary: AgentSummary = results::read_summary(&folder)?;
-        // An independent fold of what the agent wrote down must give the bits it announced.
-        let folded = own.fingerprint().to_string();
-        if folded != summary.estimate {
+        // What the agent wrote down, taken again here, must give the bits it announced.
+        let (again, own) = estimate_of(&agent.node()?, records);
+        if again != summary.estimate {
             bail!(
-                "robot {robot}: the agent ended with estimate {}, its journal folds to {folded}",
+                "robot {robot}: the agent ended with estimate {}, its journal gives {again}",
                 summary.estimate
             );
         }
         notes.extend(refusals(*robot, &summary));
         let settled = results::read_estimates(&folder.join(results::SETTLED))?;
         let online = results::read_estimates(&folder.join(results::ONLINE))?;
-        ledger.get_or_insert(own);
+        ledger = ledger.or(own);
         robots.insert(*robot, RobotResult { settled, online, summary });
     }
     let recording = out.join("recording");
     write_folder(&with_samples(&team.recording, &received), &recording, Overwrite::Refuse)?;
     setup::write_beside(&team.agents, &recording)?;
     let processes = robots.len();
-    let ledger = ledger.context("the team has no robot")?;
     Ok(RunResult { robots, ledger, notes, wall_s, processes })
+}
+
+/// Hash of the estimate that a journal gives, and the facts it holds where the strategy keeps any. The facts are
+/// folded by themselves, apart from the node that wrote them. A run keeps all its facts, so that there is nothing
+/// closed in its journals.
+fn estimate_of(config: &NodeConfig, records: Vec<Record>) -> (String, Option<Ledger>) {
+    if let Some(mut robot) = Approximate::recover(config.strategy, config.clone(), records.iter().cloned()) {
+        // As the agent did: what waited for odometry waits no longer.
+        let _ = robot.handle(Event::InputEnded);
+        return (robot.fingerprint().to_string(), None);
+    }
+    let mut ledger = Ledger::new(config.fold);
+    for record in records {
+        if let Record::Entry(entry) = record {
+            ledger.insert(entry);
+        }
+    }
+    (ledger.fingerprint().to_string(), Some(ledger))
 }
 
 /// What an agent did not take of its samples.

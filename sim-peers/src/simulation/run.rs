@@ -361,7 +361,8 @@ impl<'a> Run<'a> {
                     robot.disk.replace(node.compacted());
                 }
             }
-            Command::Estimate(_) => {}
+            // A node is of the exact strategy.
+            Command::Estimate(_) | Command::Say { .. } => {}
             Command::Notice(notice) => self.notice(id, &notice)?,
         }
         Ok(true)

@@ -16,7 +16,7 @@ use pleiad_report::write_summary;
 use pleiad_sim_peers::{Scenario, simulate};
 use serde::Serialize;
 
-use crate::cli::{ErrorArg, FaultsArgs, LandmarksArg, StrategyArg};
+use crate::cli::{ErrorArg, FaultsArgs, LandmarksArg};
 use crate::commands::replay::command_line;
 use crate::output;
 use crate::setup::{self, FilterArgs, ReplayOptions};
@@ -69,7 +69,7 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
 
 /// The worlds, one per seed, and the faults of the file.
 fn worlds(args: &FaultsArgs) -> anyhow::Result<(FaultPlan, Vec<World>, Vec<String>)> {
-    let filter = FilterArgs { strategy: StrategyArg::Exact, error: ErrorArg::Invariant };
+    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant };
     let own = args.faults.as_deref().map(FaultPlan::load).transpose()?;
     if args.input.is_dir() {
         let folder = setup::recording_folder(&args.input);

@@ -122,8 +122,8 @@ pub fn play(world: &World, kind: StrategyKind, plan: &FaultPlan, window: Window)
     };
     let mut outcome = run(&world.configs, &world.samples, &options)?;
     let mut score = RunScore {
-        bytes: outcome.bytes,
-        messages: outcome.messages,
+        bytes: outcome.total().1,
+        messages: outcome.total().0,
         refused_messages: outcome.refused_messages,
         ..RunScore::default()
     };

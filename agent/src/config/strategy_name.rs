@@ -1,0 +1,12 @@
+//! A strategy by its name.
+
+use pleiad_estimation::strategy::StrategyKind;
+use serde::{Deserialize as _, Deserializer, Serializer};
+
+pub fn serialize<S: Serializer>(kind: &StrategyKind, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(kind.name())
+}
+
+pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<StrategyKind, D::Error> {
+    String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+}
