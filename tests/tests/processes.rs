@@ -17,6 +17,8 @@ mod paused;
 mod replayed;
 #[path = "processes/restarted.rs"]
 mod restarted;
+#[path = "processes/strategies.rs"]
+mod strategies;
 
 use pleiad_estimation::RobotId;
 use pleiad_estimation::fact::{Body, Boot};
