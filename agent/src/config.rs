@@ -213,8 +213,17 @@ impl AgentConfig {
     /// # Errors
     /// [`ConfigError::Faults`].
     pub fn fault_plan(&self) -> Result<Option<FaultPlan>, ConfigError> {
-        let plan = self.faults.as_ref().map(|faults| FaultPlan::load(&faults.plan)).transpose();
-        plan.map_err(|error| ConfigError::Faults(Box::new(error)))
+        let Some(faults) = &self.faults else { return Ok(None) };
+        if let Some(origin_s) = faults.origin_s {
+            finite("faults.origin_s", origin_s)?;
+        }
+        let plan = FaultPlan::load(&faults.plan).map_err(|error| ConfigError::Faults(Box::new(error)))?;
+        if plan.is_random() {
+            let expected = "a plan without every_s, such as the one that pleiad run leaves in its folder";
+            let found = format!("{:?}", faults.plan.display().to_string());
+            return Err(ConfigError::Value { key: "faults.plan".to_owned(), found, expected });
+        }
+        Ok(Some(plan))
     }
 
     /// The team's name.

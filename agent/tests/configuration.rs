@@ -63,6 +63,7 @@ fn full() -> Table {
         evict_after_s = 1.0
         [faults]
         plan = 'faults.toml'
+        origin_s = 0.0
         [output]
         directory = 'somewhere'
     ";

@@ -8,11 +8,13 @@
 mod injector;
 mod plan;
 mod read;
+mod script;
+mod write;
 
 use std::collections::BTreeMap;
 
 pub use injector::Injector;
-pub use plan::{Fault, FaultPlan, InvalidRule, Rule};
+pub use plan::{Again, Fault, FaultPlan, InvalidRule, Rule};
 pub use read::FaultsError;
 
 use pleiad_protocol::{RobotId, Timestamp};

@@ -35,6 +35,8 @@ struct Faults {
 #[derive(Debug)]
 struct State {
     plan: FaultPlan,
+    /// Second 0 of the plan, if it is not the first instant told.
+    origin: Option<Timestamp>,
     /// The last instant told, and the plan since the first; `None` before any.
     begun: Option<(Timestamp, Injector)>,
 }
@@ -80,8 +82,15 @@ impl Faults {
 impl<B: Bus> FaultyBus<B> {
     /// Faults around the bus of a robot. Second 0 of the plan is the first instant that the robot tells.
     pub fn new(inner: B, robot: RobotId, plan: FaultPlan, seed: u64) -> Self {
-        let state = Mutex::new(State { plan, begun: None });
+        let state = Mutex::new(State { plan, origin: None, begun: None });
         Self { inner, faults: Arc::new(Faults { robot, seed, state }) }
+    }
+
+    /// Second 0 of the plan is this instant, so that a robot that starts again in the middle of a run finds
+    /// the faults where the others have them. To be said before the robot tells its first instant.
+    pub fn since(self, origin: Timestamp) -> Self {
+        self.faults.state().origin = Some(origin);
+        self
     }
 
     /// Changes the plan; what is under way stays so.
@@ -186,7 +195,8 @@ impl<B: Bus> Bus for FaultyBus<B> {
     fn team_time(&self, now: Timestamp) {
         let mut state = self.faults.state();
         let state = &mut *state;
-        let fresh = || (now, Injector::new(state.plan.clone(), self.faults.seed, now));
+        let origin = state.origin.unwrap_or(now);
+        let fresh = || (now, Injector::new(state.plan.clone(), self.faults.seed, origin));
         let (last, _) = state.begun.get_or_insert_with(fresh);
         *last = now.max(*last);
         self.inner.team_time(now);

@@ -64,6 +64,25 @@ async fn a_plan_counts_from_the_first_instant_that_the_robot_tells() {
 }
 
 #[tokio::test]
+async fn a_robot_that_starts_again_finds_the_faults_where_the_others_have_them() {
+    let network = MemoryNetwork::new();
+    let one = network.join("one");
+    let text = "[[fault]]\nwhat = 'cut'\nstart_s = 50\nend_s = 60\n";
+    for (now_s, arrives) in [(149.0, true), (150.0, false), (159.0, false), (160.0, true)] {
+        let own = std::sync::Arc::new(network.join("two"));
+        let two = FaultyBus::new(own, RobotId(2), plan(text), 1).since(Timestamp::from_seconds(100.0));
+        let mut heard = two.subscribe("pleiad/t/**").await.unwrap();
+        // The first instant that it tells after its start.
+        two.team_time(Timestamp::from_seconds(now_s));
+        one.publish("pleiad/t/1/fact", b"fact".to_vec()).await.unwrap();
+        // Operators are always heard, so that the end of the waiting is no matter of time.
+        one.publish("pleiad/t/2/control", b"end".to_vec()).await.unwrap();
+        let first = tokio::time::timeout(PATIENCE, heard.recv()).await.unwrap().unwrap();
+        assert_eq!(first.payload == b"fact", arrives, "{now_s}");
+    }
+}
+
+#[tokio::test]
 async fn damage_reaches_the_receiver_as_other_bytes() {
     let mut team = Team::new("[[fault]]\nwhat = 'corrupt'\nprobability = 1.0\nbytes = 1\n").await;
     team.two.team_time(Timestamp::from_seconds(0.0));

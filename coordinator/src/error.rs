@@ -111,13 +111,13 @@ pub enum CoordinatorError {
         /// Who.
         robot: RobotId,
     },
-    /// A process could not be signalled.
-    #[error("cannot send {signal} to the process of robot {robot}: {cause}")]
-    Signal {
+    /// A process could not be signalled or limited.
+    #[error("cannot give {treatment} to the process of robot {robot}: {cause}")]
+    Treatment {
         /// Whose.
         robot: RobotId,
-        /// What was sent.
-        signal: crate::ProcessSignal,
+        /// What it was to get.
+        treatment: String,
         /// What the system said.
         cause: std::io::Error,
     },
@@ -128,6 +128,17 @@ pub enum CoordinatorError {
         robot: RobotId,
         /// Which.
         pid: u32,
+    },
+    /// Agents that nobody here launched have not ended.
+    #[error(
+        "{} of team {team} did not end when asked; end their processes (pleiad agent) by hand",
+        list(robots)
+    )]
+    StillThere {
+        /// The team.
+        team: String,
+        /// Whose agents.
+        robots: Vec<RobotId>,
     },
     /// The supervision of the processes ended before its time.
     #[error("the supervision of the team has ended")]

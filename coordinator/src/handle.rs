@@ -9,7 +9,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
 
 use crate::membership::Member;
-use crate::process::ProcessSignal;
+use crate::process::{ProcessSignal, Treatment};
 use crate::restart::Exit;
 use crate::supervisor::{Members, Request};
 use crate::{CoordinatorError, control};
@@ -75,11 +75,17 @@ impl<B: Bus + Clone> Handle<B> {
         Ok(())
     }
 
-    /// A process that has ended in the meantime needs no signal.
     pub(crate) async fn signal(&self, robot: RobotId, signal: ProcessSignal) -> Result<(), CoordinatorError> {
+        self.treat(robot, Treatment::Signal(signal)).await
+    }
+
+    /// A process that has ended in the meantime needs no treatment.
+    pub(crate) async fn treat(&self, robot: RobotId, treatment: Treatment) -> Result<(), CoordinatorError> {
         let (done, answer) = oneshot::channel();
-        match self.request(Request::Signal { robot, signal, done }, answer).await? {
-            Some(Err(cause)) => Err(CoordinatorError::Signal { robot, signal, cause }),
+        match self.request(Request::Treat { robot, treatment, done }, answer).await? {
+            Some(Err(cause)) => {
+                Err(CoordinatorError::Treatment { robot, treatment: treatment.to_string(), cause })
+            }
             Some(Ok(())) | None => Ok(()),
         }
     }

@@ -8,7 +8,7 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use pleiad_protocol::RobotId;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, prlimit};
 use tokio::process::{Child, Command};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
@@ -92,8 +92,28 @@ impl Launcher {
     }
 }
 
-/// A signal to be sent, and where the outcome goes.
-pub(crate) type Order = (ProcessSignal, oneshot::Sender<io::Result<()>>);
+/// What is to be done to a running process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Treatment {
+    /// Send a signal.
+    Signal(ProcessSignal),
+    /// Let none of its files grow beyond so many bytes, as if the disk were full (`RLIMIT_FSIZE`); `None`
+    /// lifts that.
+    LimitFiles(Option<u64>),
+}
+
+impl fmt::Display for Treatment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Signal(signal) => signal.fmt(f),
+            Self::LimitFiles(Some(bytes)) => write!(f, "a file size limit of {bytes} bytes"),
+            Self::LimitFiles(None) => f.write_str("the end of its file size limit"),
+        }
+    }
+}
+
+/// What is to be done to a process, and where the outcome goes.
+pub(crate) type Order = (Treatment, oneshot::Sender<io::Result<()>>);
 
 /// A running process, not yet waited for.
 #[derive(Debug)]
@@ -114,8 +134,8 @@ impl Process {
         self.kill_on_drop = false;
     }
 
-    /// Waits until the process has ended, passing signals on meanwhile. Both happen here, so that no
-    /// signal goes to a process id that the system has given to someone else.
+    /// Waits until the process has ended, treating it meanwhile. Both happen here, so that nothing is done to
+    /// a process id that the system has given to someone else.
     pub(crate) async fn wait(mut self, mut orders: mpsc::Receiver<Order>) -> (Exit, Duration) {
         loop {
             tokio::select! {
@@ -123,19 +143,28 @@ impl Process {
                     let exit = status.map_or(Exit::NotStarted, Exit::from);
                     return (exit, self.started.elapsed());
                 }
-                Some((signal, outcome)) = orders.recv() => {
+                Some((treatment, outcome)) = orders.recv() => {
                     // Who asked may have stopped waiting.
-                    let _ = outcome.send(self.send(signal));
+                    let _ = outcome.send(self.treat(treatment));
                 }
             }
         }
     }
 
-    /// A process that has ended needs no signal.
-    fn send(&self, signal: ProcessSignal) -> io::Result<()> {
+    /// A process that has ended needs no treatment.
+    fn treat(&self, treatment: Treatment) -> io::Result<()> {
         let pid = self.child.id().and_then(|pid| i32::try_from(pid).ok()).and_then(Pid::from_raw);
         let Some(pid) = pid else { return Ok(()) };
-        Ok(kill_process(pid, signal.unix())?)
+        match treatment {
+            Treatment::Signal(signal) => kill_process(pid, signal.unix())?,
+            Treatment::LimitFiles(bytes) => {
+                // The soft limit alone, so that no privilege is needed to lift it again.
+                let own = getrlimit(Resource::Fsize);
+                let current = if bytes.is_some() { bytes } else { own.current };
+                prlimit(Some(pid), Resource::Fsize, Rlimit { current, maximum: own.maximum })?;
+            }
+        }
+        Ok(())
     }
 }
 

@@ -12,7 +12,7 @@ use tokio::sync::{broadcast, mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 
 use crate::membership::{Action, Input, Member, Membership, TeamEvent};
-use crate::process::{Launcher, Order, Process, ProcessSignal};
+use crate::process::{Launcher, Order, Process, Treatment};
 use crate::restart::Exit;
 
 /// What is asked of the supervisor. Each request is answered when it is done.
@@ -22,8 +22,8 @@ pub(crate) enum Request {
     Hold { robots: BTreeSet<RobotId>, done: oneshot::Sender<()> },
     /// Start an ended one.
     Start { robot: RobotId, done: oneshot::Sender<()> },
-    /// Signal a process. The sender is dropped where there is none.
-    Signal { robot: RobotId, signal: ProcessSignal, done: oneshot::Sender<io::Result<()>> },
+    /// Do something to a process. The sender is dropped where there is none.
+    Treat { robot: RobotId, treatment: Treatment, done: oneshot::Sender<io::Result<()>> },
 }
 
 /// Everything known of everyone.
@@ -122,10 +122,10 @@ impl Supervisor {
                 self.handle(Input::Start { robot });
                 let _ = done.send(());
             }
-            Request::Signal { robot, signal, done } => {
-                tracing::info!(robot = robot.0, %signal, "signalling the agent's process");
+            Request::Treat { robot, treatment, done } => {
+                tracing::info!(robot = robot.0, %treatment, "to the agent's process");
                 if let Some(orders) = self.orders.get(&robot) {
-                    let _ = orders.try_send((signal, done));
+                    let _ = orders.try_send((treatment, done));
                 }
             }
         }

@@ -14,7 +14,7 @@ use tokio::time::Instant;
 use crate::config::{AgentEntry, CoordinatorConfig};
 use crate::handle::{Departure, Handle, How};
 use crate::membership::{Member, Membership, TeamEvent};
-use crate::process::{Launcher, ProcessSignal};
+use crate::process::{Launcher, ProcessSignal, Treatment};
 use crate::restart::{Exit, seconds};
 use crate::settled::{Difference, differences};
 use crate::supervisor::{Members, Request, Supervisor};
@@ -251,10 +251,23 @@ impl<B: Bus + Clone> Team<B> {
     /// [`Team::kill`] for one that is not.
     ///
     /// # Errors
-    /// [`CoordinatorError::UnknownRobot`], [`CoordinatorError::Signal`].
+    /// [`CoordinatorError::UnknownRobot`], [`CoordinatorError::Treatment`].
     pub async fn signal(&self, robot: RobotId, signal: ProcessSignal) -> Result<(), CoordinatorError> {
         self.agent(robot)?;
         self.handle.signal(robot, signal).await
+    }
+
+    /// Lets no file of an agent grow beyond so many bytes, as if its disk were full, until this is lifted
+    /// with `None` or the process ends. An agent that ends by it is not restarted; see [`Team::restart`].
+    ///
+    /// # Errors
+    /// [`CoordinatorError::UnknownRobot`], [`CoordinatorError::Treatment`].
+    pub async fn limit_files(&self, robot: RobotId, bytes: Option<u64>) -> Result<(), CoordinatorError> {
+        self.agent(robot)?;
+        if bytes.is_some() {
+            self.handle.hold(BTreeSet::from([robot])).await?;
+        }
+        self.handle.treat(robot, Treatment::LimitFiles(bytes)).await
     }
 
     /// Waits until all agents have ended for good; returns how.

@@ -37,6 +37,8 @@ pub enum Command {
     Agent(AgentArgs),
     /// Launch and watch the agents of a configuration.
     Coordinator(CoordinatorArgs),
+    /// Have a robot that will not come back evicted, so that its team can close its past without it.
+    Evict(EvictArgs),
     /// Feed samples into running agents through their sensor keys.
     #[command(name = "sim-peers")]
     SimPeers(SimPeersArgs),
@@ -86,8 +88,8 @@ pub struct RunArgs {
     /// Coordinates of the filter's error.
     #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
     pub error: ErrorArg,
-    /// A file of fault tables: what goes wrong between the robots (docs/faults.md); those of the scenario
-    /// itself if absent.
+    /// A file of fault tables: what goes wrong between the robots and with their processes (docs/faults.md);
+    /// those of the scenario itself if absent.
     #[arg(long, value_name = "FILE")]
     pub faults: Option<PathBuf>,
     /// Restart an agent that ends by itself.
@@ -289,6 +291,23 @@ pub struct CoordinatorArgs {
 }
 
 #[derive(Debug, Args)]
+pub struct EvictArgs {
+    /// The team.
+    pub team: String,
+    /// The robot that will not come back.
+    pub robot: u32,
+    /// Endpoints of agents of the team (or of a router).
+    #[arg(long, required = true)]
+    pub connect: Vec<String>,
+    /// Evict it although it answers.
+    #[arg(long)]
+    pub anyway: bool,
+    /// How long the others may take to decide it, seconds.
+    #[arg(long, default_value_t = 30.0)]
+    pub within: f64,
+}
+
+#[derive(Debug, Args)]
 pub struct SimPeersArgs {
     /// A scenario to simulate, or a recording folder to play.
     pub input: PathBuf,
@@ -304,6 +323,9 @@ pub struct SimPeersArgs {
     /// Seconds of team time per second; as fast as the agents can if absent.
     #[arg(long)]
     pub speed: Option<f64>,
+    /// An agent that has not acknowledged samples after so many seconds loses them; the others wait as long.
+    #[arg(long, default_value_t = 5.0)]
+    pub patience: f64,
     /// Print the team time reached, a line per second of it.
     #[arg(long)]
     pub progress: bool,

@@ -17,6 +17,7 @@ use pleiad_report::{
 };
 use serde::Serialize;
 
+use crate::commands::Survived;
 use crate::setup::TRUTH_GAP_S;
 
 /// What one robot's agent left behind, from whichever process.
@@ -37,6 +38,8 @@ pub struct RunResult {
     pub wall_s: f64,
     /// Agent processes; 0 if all ran in this one.
     pub processes: usize,
+    /// What the processes came through, if something was to go wrong.
+    pub survived: Option<Survived>,
 }
 
 impl RunResult {

@@ -53,6 +53,11 @@ impl Feeder {
         *tokio::time::timeout(PATIENCE, reached).await.expect("the feed does not advance").unwrap()
     }
 
+    /// As [`Feeder::reached`], however long it takes.
+    pub async fn reached_at_last(&mut self, seconds: f64) -> Timestamp {
+        *self.now.wait_for(|now| now.seconds() >= seconds).await.unwrap()
+    }
+
     /// Lets it go on to this time.
     pub fn go_on(&self, until_s: f64) {
         self.limit.send_replace(until_s);

@@ -84,12 +84,16 @@ pub struct Stage {
 
 impl Stage {
     /// The team of [`SCENARIO`] with this many robots.
-    #[allow(clippy::await_holding_lock, reason = "the turn is for the whole of a test, on its own runtime")]
     pub async fn set(robots: u32) -> Self {
+        Self::of(&SCENARIO.replace("team_size = 3", &format!("team_size = {robots}"))).await
+    }
+
+    /// The team of a scenario.
+    #[allow(clippy::await_holding_lock, reason = "the turn is for the whole of a test, on its own runtime")]
+    pub async fn of(text: &str) -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let turn = program::turn();
-        let text = SCENARIO.replace("team_size = 3", &format!("team_size = {robots}"));
-        let scenario = Scenario::from_toml(&text, "stage.toml").unwrap();
+        let scenario = Scenario::from_toml(text, "stage.toml").unwrap();
         let run = simulate(&scenario, scenario.seed).unwrap();
         let robots: Vec<_> = scenario.robots.keys().copied().collect();
         let endpoints = endpoints(&robots).unwrap();
@@ -158,6 +162,15 @@ impl Stage {
         let mut config = self.configs[&robot].clone();
         config.prior = Some(agents::prior(&prior));
         self.configure(config);
+    }
+
+    /// Changes what all agents are told.
+    pub fn tell(&mut self, change: impl Fn(&mut AgentConfig)) {
+        for robot in self.robots() {
+            let mut config = self.configs[&robot].clone();
+            change(&mut config);
+            self.configure(config);
+        }
     }
 
     /// The robots.

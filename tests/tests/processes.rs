@@ -5,10 +5,16 @@
 
 #[path = "processes/by_hand.rs"]
 mod by_hand;
+#[path = "processes/chaos.rs"]
+mod chaos;
 #[path = "processes/coordinator.rs"]
 mod coordinator;
+#[path = "processes/evicted.rs"]
+mod evicted;
 #[path = "processes/faulty.rs"]
 mod faulty;
+#[path = "processes/gps.rs"]
+mod gps;
 #[path = "processes/late.rs"]
 mod late;
 #[path = "processes/paused.rs"]

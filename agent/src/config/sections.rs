@@ -266,7 +266,7 @@ impl Default for BusSection {
 }
 
 /// `[faults]`: what is to go wrong between the robots, for trials.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FaultsSection {
     /// A file with `[[fault]]` tables, a scenario for instance. Relative to the file it is read from.
@@ -274,6 +274,9 @@ pub struct FaultsSection {
     /// Seed of the links' luck; the same for all robots.
     #[serde(default)]
     pub seed: u64,
+    /// Team time of second 0 of the plan, s; the robot's first sample if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin_s: Option<f64>,
 }
 
 /// How an agent takes part in the network.

@@ -133,7 +133,12 @@ impl Injector {
                         }
                     }
                 }
-                Fault::Clock { .. } => {}
+                // Not of messages.
+                Fault::Clock { .. }
+                | Fault::Kill { .. }
+                | Fault::Stop { .. }
+                | Fault::DiskFull { .. }
+                | Fault::CoordinatorDies => {}
             }
         }
         if let Some(cause) = lost {

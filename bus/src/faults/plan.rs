@@ -76,6 +76,81 @@ pub enum Fault {
         /// Growth, 1e-6.
         drift_ppm: f64,
     },
+    /// The robots' processes are killed (SIGKILL), and started again at the end of the fault.
+    Kill {
+        /// Whose.
+        robots: BTreeSet<RobotId>,
+    },
+    /// The robots' processes stand still (SIGSTOP), and go on at the end of the fault (SIGCONT).
+    Stop {
+        /// Whose.
+        robots: BTreeSet<RobotId>,
+    },
+    /// The robots' journals cannot grow; a process that ends of it is started again at the end of the fault.
+    DiskFull {
+        /// Whose.
+        robots: BTreeSet<RobotId>,
+    },
+    /// The coordinator's process is killed, for good.
+    CoordinatorDies,
+}
+
+impl Fault {
+    /// Whether it befalls processes rather than messages or clocks.
+    pub fn is_of_processes(&self) -> bool {
+        matches!(self, Self::Kill { .. } | Self::Stop { .. } | Self::DiskFull { .. } | Self::CoordinatorDies)
+    }
+
+    /// How it is written.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Loss { .. } => "loss",
+            Self::Burst { .. } => "burst",
+            Self::Delay { .. } => "delay",
+            Self::Reorder { .. } => "reorder",
+            Self::Duplicate { .. } => "duplicate",
+            Self::Corrupt { .. } => "corrupt",
+            Self::Cut => "cut",
+            Self::Partition { .. } => "partition",
+            Self::Away { .. } => "away",
+            Self::Slow { .. } => "slow",
+            Self::Clock { .. } => "clock",
+            Self::Kill { .. } => "kill",
+            Self::Stop { .. } => "stop",
+            Self::DiskFull { .. } => "disk_full",
+            Self::CoordinatorDies => "coordinator_dies",
+        }
+    }
+
+    /// The robots that are named as its own, if it has such.
+    pub fn robots(&self) -> Option<&BTreeSet<RobotId>> {
+        match self {
+            Self::Away { robots }
+            | Self::Kill { robots }
+            | Self::Stop { robots }
+            | Self::DiskFull { robots } => Some(robots),
+            _ => None,
+        }
+    }
+
+    pub(super) fn robots_mut(&mut self) -> Option<&mut BTreeSet<RobotId>> {
+        match self {
+            Self::Away { robots }
+            | Self::Kill { robots }
+            | Self::Stop { robots }
+            | Self::DiskFull { robots } => Some(robots),
+            _ => None,
+        }
+    }
+}
+
+/// A fault that happens again and again, at random times.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Again {
+    /// Mean time from the end of one to the start of the next, s; uniform from half of it to one and a half.
+    pub every_s: f64,
+    /// Mean length, s; uniform from half of it to one and a half.
+    pub for_s: f64,
 }
 
 /// A fault, and what it concerns.
@@ -93,6 +168,9 @@ pub struct Rule {
     pub start_s: f64,
     /// Until this many.
     pub end_s: f64,
+    /// Not all the time in between, but now and then: [`FaultPlan::scripted`] says when. Until then it is
+    /// never on.
+    pub again: Option<Again>,
 }
 
 impl Rule {
@@ -105,6 +183,7 @@ impl Rule {
             messages: BTreeSet::new(),
             start_s: 0.0,
             end_s: f64::INFINITY,
+            again: None,
         }
     }
 
@@ -114,7 +193,7 @@ impl Rule {
     }
 
     pub(super) fn is_on(&self, t_s: f64) -> bool {
-        (self.start_s..self.end_s).contains(&t_s)
+        self.again.is_none() && (self.start_s..self.end_s).contains(&t_s)
     }
 
     pub(super) fn concerns(&self, from: RobotId, to: RobotId, kind: Option<&str>) -> bool {
@@ -133,6 +212,10 @@ impl Rule {
         seconds("start_s", self.start_s)?;
         if self.end_s.is_nan() || self.end_s <= self.start_s {
             return Err(invalid("end_s", self.end_s, "a time after start_s"));
+        }
+        if let Some(again) = self.again {
+            within("every_s", again.every_s, SHORTEST_S..=MAX_TIME_S, "seconds from 0.1")?;
+            within("for_s", again.for_s, SHORTEST_S..=MAX_TIME_S, "seconds from 0.1")?;
         }
         match &self.fault {
             Fault::Loss { loss } => probability("loss", *loss),
@@ -162,7 +245,7 @@ impl Rule {
                 probability("probability", *found)?;
                 within("bytes", f64::from(*bytes), 1.0..=255.0, "a number of bytes from 1 to 255")
             }
-            Fault::Cut => Ok(()),
+            Fault::Cut | Fault::CoordinatorDies => Ok(()),
             Fault::Partition { groups } => {
                 let mut seen = BTreeSet::new();
                 for robot in groups.iter().flatten() {
@@ -171,13 +254,18 @@ impl Rule {
                         return Err(invalid("groups", f64::from(robot.0), expected));
                     }
                 }
-                if groups.is_empty() {
+                // At random times, the groups are random too where none are given.
+                if groups.is_empty() && self.again.is_none() {
                     return Err(invalid("groups", 0.0, "at least one group of robots"));
                 }
                 Ok(())
             }
-            Fault::Away { robots } => {
-                if robots.is_empty() {
+            Fault::Away { robots }
+            | Fault::Kill { robots }
+            | Fault::Stop { robots }
+            | Fault::DiskFull { robots } => {
+                // At random times, it is one of all where none are given.
+                if robots.is_empty() && self.again.is_none() {
                     return Err(invalid("robots", 0.0, "at least one robot"));
                 }
                 Ok(())
@@ -195,6 +283,8 @@ impl Rule {
 
 /// Longest delay; within it, times keep their nanoseconds.
 const MAX_TIME_S: f64 = 1e6;
+/// Shortest time between random faults.
+const SHORTEST_S: f64 = 0.1;
 
 /// A value of a rule that makes no sense.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

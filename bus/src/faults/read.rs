@@ -7,7 +7,7 @@ use pleiad_protocol::{Message, RobotId};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::plan::{Fault, FaultPlan, Rule};
+use super::plan::{Again, Fault, FaultPlan, Rule};
 
 /// Why faults could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -53,21 +53,27 @@ pub enum FaultsError {
     },
 }
 
-/// Keys that every fault may have.
-const COMMON: [&str; 6] = ["what", "from", "to", "messages", "start_s", "end_s"];
-/// The faults and their own keys.
-const FAULTS: [(&str, &[&str]); 11] = [
-    ("loss", &["loss"]),
-    ("burst", &["loss", "mean_length"]),
-    ("delay", &["delay_s", "jitter_s"]),
-    ("reorder", &["probability", "by_s"]),
-    ("duplicate", &["probability", "within_s"]),
-    ("corrupt", &["probability", "bytes"]),
-    ("cut", &[]),
-    ("partition", &["groups"]),
-    ("away", &["robots"]),
-    ("slow", &["messages_per_s", "queue"]),
-    ("clock", &["offset_s", "drift_ppm"]),
+/// Keys that every fault of messages may have, every one of processes, and the death of the coordinator.
+const LINKS: [&str; 8] = ["what", "from", "to", "messages", "start_s", "end_s", "for_s", "every_s"];
+const PROCESSES: [&str; 5] = ["what", "start_s", "end_s", "for_s", "every_s"];
+const COORDINATOR: [&str; 2] = ["what", "start_s"];
+/// The faults, the keys they share with others, and their own.
+const FAULTS: [(&str, &[&str], &[&str]); 15] = [
+    ("loss", &LINKS, &["loss"]),
+    ("burst", &LINKS, &["loss", "mean_length"]),
+    ("delay", &LINKS, &["delay_s", "jitter_s"]),
+    ("reorder", &LINKS, &["probability", "by_s"]),
+    ("duplicate", &LINKS, &["probability", "within_s"]),
+    ("corrupt", &LINKS, &["probability", "bytes"]),
+    ("cut", &LINKS, &[]),
+    ("partition", &LINKS, &["groups"]),
+    ("away", &LINKS, &["robots"]),
+    ("slow", &LINKS, &["messages_per_s", "queue"]),
+    ("clock", &LINKS, &["offset_s", "drift_ppm"]),
+    ("kill", &PROCESSES, &["robots"]),
+    ("stop", &PROCESSES, &["robots"]),
+    ("disk_full", &PROCESSES, &["robots"]),
+    ("coordinator_dies", &COORDINATOR, &[]),
 ];
 
 impl FaultPlan {
@@ -158,17 +164,17 @@ impl<'a, 'b> Entry<'a, 'b> {
     }
 
     fn rule(&self) -> Result<Rule, FaultsError> {
-        let words: Vec<&str> = FAULTS.iter().map(|(word, _)| *word).collect();
+        let words: Vec<&str> = FAULTS.iter().map(|(word, ..)| *word).collect();
         let expected = format!("one of {}", words.join(", "));
         let Some(what) = self.get("what") else { return Err(self.missing("what", &expected)) };
         let word = what.get_ref().as_str();
-        let Some((word, own)) = FAULTS.iter().find(|(known, _)| Some(*known) == word) else {
+        let Some((word, common, own)) = FAULTS.iter().find(|(known, ..)| Some(*known) == word) else {
             return Err(self.source.wrong(&self.key("what"), what, &expected));
         };
         for (key, _) in self.entries {
             let name: &str = key.get_ref();
-            if !COMMON.contains(&name) && !own.contains(&name) {
-                let known: Vec<&str> = COMMON.iter().chain(own.iter()).copied().collect();
+            if !common.contains(&name) && !own.contains(&name) {
+                let known: Vec<&str> = common.iter().chain(own.iter()).copied().collect();
                 return Err(FaultsError::UnknownKey {
                     place: self.source.place(key.span().start),
                     key: self.key(name),
@@ -176,13 +182,29 @@ impl<'a, 'b> Entry<'a, 'b> {
                 });
             }
         }
+        let again = self.again()?;
+        let start_s = self.number("start_s", Some(0.0))?;
+        let mut end_s = self.number("end_s", Some(f64::INFINITY))?;
+        if again.is_none()
+            && let Some(length) = self.get("for_s")
+        {
+            if self.get("end_s").is_some() {
+                let expected = "either for_s or end_s, unless every_s is given too";
+                return Err(self.source.wrong(&self.key("for_s"), length, expected));
+            }
+            end_s = start_s + self.number("for_s", None)?;
+            if end_s.is_nan() || end_s <= start_s {
+                return Err(self.source.wrong(&self.key("for_s"), length, "a positive number of seconds"));
+            }
+        }
         let rule = Rule {
             fault: self.fault(word)?,
             from: self.robots("from")?.unwrap_or_default(),
             to: self.robots("to")?.unwrap_or_default(),
             messages: self.messages()?,
-            start_s: self.number("start_s", Some(0.0))?,
-            end_s: self.number("end_s", Some(f64::INFINITY))?,
+            start_s,
+            end_s,
+            again,
         };
         rule.check().map_err(|wrong| {
             let value = self.get(wrong.key).unwrap_or(self.table);
@@ -194,6 +216,18 @@ impl<'a, 'b> Entry<'a, 'b> {
             }
         })?;
         Ok(rule)
+    }
+
+    fn again(&self) -> Result<Option<Again>, FaultsError> {
+        if self.get("every_s").is_none() {
+            return Ok(None);
+        }
+        let every_s = self.number("every_s", None)?;
+        let for_s = match self.get("for_s") {
+            Some(_) => self.number("for_s", None)?,
+            None => return Err(self.missing("for_s", "how long it lasts each time, in seconds")),
+        };
+        Ok(Some(Again { every_s, for_s }))
     }
 
     fn fault(&self, word: &str) -> Result<Fault, FaultsError> {
@@ -220,11 +254,11 @@ impl<'a, 'b> Entry<'a, 'b> {
                 bytes: u8::try_from(self.whole("bytes", 1)?).unwrap_or(0),
             },
             "partition" => Fault::Partition { groups: self.groups()? },
-            "away" => Fault::Away {
-                robots: self
-                    .robots("robots")?
-                    .ok_or_else(|| self.missing("robots", "robots, as in [1, 2]"))?,
-            },
+            "away" => Fault::Away { robots: self.whom()? },
+            "kill" => Fault::Kill { robots: self.whom()? },
+            "stop" => Fault::Stop { robots: self.whom()? },
+            "disk_full" => Fault::DiskFull { robots: self.whom()? },
+            "coordinator_dies" => Fault::CoordinatorDies,
             "slow" => Fault::Slow {
                 messages_per_s: self.number("messages_per_s", None)?,
                 queue: self.whole("queue", 64)?,
@@ -275,9 +309,23 @@ impl<'a, 'b> Entry<'a, 'b> {
         self.get(key).map(|value| self.list(key, value)).transpose()
     }
 
+    /// Whom it befalls: at random times one of all, unless some are named.
+    fn whom(&self) -> Result<BTreeSet<RobotId>, FaultsError> {
+        match self.robots("robots")? {
+            None if self.get("every_s").is_none() => {
+                Err(self.missing("robots", "robots, as in [1, 2], or every_s: one of all now and then"))
+            }
+            robots => Ok(robots.unwrap_or_default()),
+        }
+    }
+
     fn groups(&self) -> Result<Vec<BTreeSet<RobotId>>, FaultsError> {
         let expected = "groups of robots, as in [[1, 2], [3]]";
-        let Some(value) = self.get("groups") else { return Err(self.missing("groups", expected)) };
+        let Some(value) = self.get("groups") else {
+            // At random times the groups are random too.
+            let again = self.get("every_s").map(|_| Vec::new());
+            return again.ok_or_else(|| self.missing("groups", expected));
+        };
         let DeValue::Array(items) = value.get_ref() else {
             return Err(self.source.wrong(&self.key("groups"), value, expected));
         };

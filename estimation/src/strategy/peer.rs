@@ -218,10 +218,10 @@ impl Peer {
             match (observation, message) {
                 (None, None) => return,
                 (Some(own), other) if other.is_none_or(|other| own <= other) => {
-                    if let Some(sample) = self.observations.pop_front() {
-                        if let Err(refusal) = self.observe(&sample, out) {
-                            self.samples.refuse_accepted(&refusal);
-                        }
+                    if let Some(sample) = self.observations.pop_front()
+                        && let Err(refusal) = self.observe(&sample, out)
+                    {
+                        self.samples.refuse_accepted(&refusal);
                     }
                 }
                 _ => {

@@ -6,7 +6,7 @@ use anyhow::Context;
 use pleiad_agent::AgentConfig;
 use pleiad_agent::config::BusMode;
 use pleiad_bus::{Bus, FaultyBus, ZenohBus, ZenohConfig, ZenohMode};
-use pleiad_estimation::RobotId;
+use pleiad_estimation::{RobotId, Timestamp};
 
 use crate::cli::AgentArgs;
 
@@ -14,13 +14,17 @@ use crate::cli::AgentArgs;
 pub fn run(args: &AgentArgs) -> anyhow::Result<()> {
     let config = AgentConfig::read(&args.config)?;
     runtime()?.block_on(async {
+        let _limits = report_file_limits();
         let bus = Arc::new(ZenohBus::open(&zenoh_config(&config)).await?);
         // Every start of the process is told apart from every other by a number nobody can guess.
         let nonce = getrandom::u64().context("the system gives no random number")?;
         let outcome = match (config.fault_plan()?, &config.faults) {
             (Some(plan), Some(faults)) => {
                 tracing::warn!(plan = %faults.plan.display(), "messages of peers are lost and delayed on purpose");
-                let faulty = FaultyBus::new(bus.clone(), RobotId(config.robot), plan, faults.seed);
+                let mut faulty = FaultyBus::new(bus.clone(), RobotId(config.robot), plan, faults.seed);
+                if let Some(origin_s) = faults.origin_s {
+                    faulty = faulty.since(Timestamp::from_seconds(origin_s));
+                }
                 pleiad_agent::driver::run(&config, &faulty, nonce, stopped()).await
             }
             _ => pleiad_agent::driver::run(&config, &bus, nonce, stopped()).await,
@@ -28,6 +32,14 @@ pub fn run(args: &AgentArgs) -> anyhow::Result<()> {
         bus.close().await;
         Ok(outcome?)
     })
+}
+
+/// A file that may not grow any further is an error of the write, by file and cause, rather than the end of
+/// the process by a signal (SIGXFSZ), for as long as this is kept.
+fn report_file_limits() -> Option<tokio::signal::unix::Signal> {
+    const SIGXFSZ: i32 = 25;
+    let caught = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::from_raw(SIGXFSZ));
+    caught.inspect_err(|error| tracing::warn!(%error, "SIGXFSZ cannot be caught")).ok()
 }
 
 /// The runtime that zenoh needs: several threads.

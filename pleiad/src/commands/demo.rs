@@ -120,6 +120,7 @@ fn run_case(args: &DemoArgs, name: &str, text: &str, out: &Path) -> anyhow::Resu
         speed: args.speed,
         restart: false,
         label: name,
+        faults: None,
     };
     let result = runner::as_processes(&team, out, &options)?;
     write_run(&team, &result, out, &command_line(), None)?;

@@ -5,6 +5,7 @@ mod coordinator;
 mod demo;
 mod diagnose;
 mod effects;
+mod evict;
 mod faults;
 mod observability;
 mod replay;
@@ -13,6 +14,8 @@ mod runner;
 mod shells;
 mod sim_peers;
 mod simulate;
+
+pub use runner::Survived;
 
 use crate::cli::Command;
 
@@ -29,6 +32,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Effects(args) => effects::run(&args),
         Command::Agent(args) => agent::run(&args),
         Command::Coordinator(args) => coordinator::run(&args),
+        Command::Evict(args) => evict::run(&args),
         Command::SimPeers(args) => sim_peers::run(&args),
         Command::Completions { shell } => shells::completions(shell),
     }

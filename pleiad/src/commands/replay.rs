@@ -11,7 +11,7 @@ use pleiad_recording::{IngestReport, ReadOptions, Recording, tum};
 use pleiad_report::{ReplayReport, RobotScore, replay_report, run_report, write_summary};
 use serde::Serialize;
 
-use super::runner::{self, Feeder, ProcessOptions};
+use super::runner::{self, Feeder, ProcessOptions, Survived};
 use crate::cli::ReplayArgs;
 use crate::evaluation::{self, NisJson, RunResult};
 use crate::setup::{self, FilterArgs, ReplayOptions, Team};
@@ -33,6 +33,8 @@ pub struct ReplayJson {
     pub nis: Option<NisJson>,
     pub seconds: SecondsJson,
     pub processes: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faults: Option<Survived>,
     pub notes: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ingest: Option<IngestReport>,
@@ -92,8 +94,13 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let team = setup::recorded(&recording, &options)?;
     let out = crate::folder::create(args.out.as_deref(), &format!("replay-{}", recording.name))?;
     let result = if args.processes {
-        let options =
-            ProcessOptions { feeder: Feeder::Samples, speed: None, restart: false, label: "replaying" };
+        let options = ProcessOptions {
+            feeder: Feeder::Samples,
+            speed: None,
+            restart: false,
+            label: "replaying",
+            faults: None,
+        };
         runner::as_processes(&team, &out, &options)?
     } else {
         runner::in_process(&team, "replaying")?
@@ -200,6 +207,7 @@ fn summary(
         nis: result.ledger.as_ref().map(evaluation::nis),
         seconds: SecondsJson { recorded: last.seconds_since(first), wall: result.wall_s },
         processes: result.processes,
+        faults: result.survived.clone(),
         notes: result.notes.clone(),
         ingest,
     }
@@ -286,6 +294,22 @@ pub fn text(json: &ReplayJson) -> String {
             "NIS per degree of freedom {:.2}, {:.1} % within the 95 % bound; {bytes:.0} bytes per relative observation",
             nis.mean,
             100.0 * nis.within_95,
+        );
+    }
+    if let Some(faults) = &json.faults {
+        let what = &faults.befallen;
+        let _ = writeln!(
+            text,
+            "faults: {} kills, {} stops, {} full disks, {} deaths of the coordinator, {} partitions; of {} \
+             observations {} lost and {} counted twice; one estimate, that of an undisturbed fold",
+            what.kills,
+            what.stops,
+            what.full_disks,
+            what.coordinator_deaths,
+            faults.partitions,
+            faults.observations,
+            faults.lost,
+            faults.counted_twice
         );
     }
     for note in &json.notes {

@@ -1,39 +1,41 @@
 //! A team run to its end: in this process under virtual time, or as agent processes.
 
+mod conduct;
+mod survived;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use pleiad_agent::config::{AgentConfig, BusSection};
+use pleiad_agent::config::{AgentConfig, BusSection, FaultsSection};
 use pleiad_agent::journal::Journal;
 use pleiad_agent::results::{self, AgentSummary};
 use pleiad_agent::{Approximate, ConfigError, Event, NodeConfig, Record, driver};
-use pleiad_bus::{Bus, ZenohBus};
-use pleiad_coordinator::{AgentEntry, CoordinatorConfig, Restart, Team as Agents, endpoints};
+use pleiad_bus::{Bus, FaultPlan, ZenohBus};
+use pleiad_coordinator::{AgentEntry, CoordinatorConfig, Restart, Schedule, endpoints};
+use pleiad_estimation::RobotId;
 use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::sample::Sample;
 use pleiad_estimation::strategy::StrategyKind;
-use pleiad_estimation::{RobotId, Timestamp};
 use pleiad_recording::{Overwrite, Recording, RobotRecording, write_folder};
 use pleiad_sim_peers::strategies::{self, StrategyOptions};
 use pleiad_sim_peers::{Fleet, FleetOptions};
-use tokio::io::{AsyncBufReadExt, BufReader};
 
 use super::agent::runtime;
 use crate::evaluation::{RobotResult, RunResult};
 use crate::setup::{self, Team};
 use crate::{folder, output};
+use conduct::Conduct;
+pub use survived::Survived;
+use survived::survived;
 
 /// The plan of faults beside a run.
 const FAULTS: &str = "faults.toml";
 /// Digest rounds granted after the last sample; without faults one is enough.
 const SETTLING_ROUNDS: u32 = 50;
-/// Limits for a machine that is very busy; a run that goes well never comes near them.
-const ALIVE_WITHIN: Duration = Duration::from_mins(1);
-const SETTLED_WITHIN: Duration = Duration::from_mins(1);
+/// For a machine that is very busy; a run that goes well never comes near it.
 const ENDED_WITHIN: Duration = Duration::from_secs(30);
 
 /// Runs all robots in this process.
@@ -63,7 +65,7 @@ fn approximate_in_process(team: &Team, kind: StrategyKind) -> anyhow::Result<Run
         robots.insert(robot, RobotResult { online: settled.clone(), settled, summary });
     }
     let wall_s = began.elapsed().as_secs_f64();
-    Ok(RunResult { robots, ledger: None, notes, wall_s, processes: 0 })
+    Ok(RunResult { robots, ledger: None, notes, wall_s, processes: 0, survived: None })
 }
 
 fn nodes_in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
@@ -97,7 +99,14 @@ fn nodes_in_process(team: &Team, label: &str) -> anyhow::Result<RunResult> {
         ledger.get_or_insert_with(|| outcome.node.ledger().clone());
         robots.insert(robot, result);
     }
-    Ok(RunResult { robots, ledger, notes, wall_s: began.elapsed().as_secs_f64(), processes: 0 })
+    Ok(RunResult {
+        robots,
+        ledger,
+        notes,
+        wall_s: began.elapsed().as_secs_f64(),
+        processes: 0,
+        survived: None,
+    })
 }
 
 /// Where the process that feeds the agents gets its samples from.
@@ -113,6 +122,16 @@ pub enum Feeder<'a> {
     Samples,
 }
 
+/// What is to go wrong in a run.
+pub struct Faults {
+    /// All of it, with nothing left to chance.
+    pub plan: FaultPlan,
+    /// Of the links' luck.
+    pub seed: u64,
+    /// What befalls processes.
+    pub schedule: Schedule,
+}
+
 /// How agent processes are run.
 pub struct ProcessOptions<'a> {
     /// Where the samples come from.
@@ -123,6 +142,8 @@ pub struct ProcessOptions<'a> {
     pub restart: bool,
     /// For the progress bar.
     pub label: &'a str,
+    /// What is to go wrong.
+    pub faults: Option<Faults>,
 }
 
 /// Runs one agent process per robot over zenoh on loopback, fed by one more process.
@@ -136,16 +157,23 @@ pub fn as_processes(team: &Team, out: &Path, options: &ProcessOptions) -> anyhow
     if let Some(model) = team.agents.values().find_map(|agent| agent.model.as_ref()) {
         setup::copy_model(model, &out.join(setup::MODEL))?;
     }
-    if let Some(faults) = team.agents.values().find_map(|agent| agent.faults.as_ref()) {
+    if let Some(faults) = &options.faults {
         let to = out.join(FAULTS);
-        std::fs::copy(&faults.plan, &to).with_context(|| format!("cannot write {}", to.display()))?;
+        std::fs::write(&to, faults.plan.to_toml())
+            .with_context(|| format!("cannot write {}", to.display()))?;
     }
+    let span = team.span().context("there is not a single sample to run on")?;
+    let of_links = |faults: &&Faults| !faults.plan.rules.iter().all(|rule| rule.fault.is_of_processes());
+    let on_links = options.faults.as_ref().filter(of_links);
     let mut entries = Vec::new();
     for (robot, agent) in &team.agents {
         let mut agent = agent.clone();
-        if let Some(faults) = &mut agent.faults {
-            faults.plan = Path::new("../..").join(FAULTS);
-        }
+        // From the first sample of the team on, also for an agent that starts again.
+        agent.faults = on_links.map(|faults| FaultsSection {
+            plan: Path::new("../..").join(FAULTS),
+            seed: faults.seed,
+            origin_s: Some(span.0.seconds()),
+        });
         agent.model = agent.model.map(|_| Path::new("../..").join(setup::MODEL));
         let endpoint = endpoints.get(robot).context("an endpoint for every robot")?;
         agent.team.clone_from(&name);
@@ -176,14 +204,21 @@ pub fn as_processes(team: &Team, out: &Path, options: &ProcessOptions) -> anyhow
         bus: pleiad_coordinator::BusSection { connect: connect.clone(), ..Default::default() },
         agents: entries,
     };
-    let span = team.span().context("there is not a single sample to run on")?;
-    runtime()?.block_on(async {
+    let befallen = runtime()?.block_on(async {
         let bus = Arc::new(ZenohBus::open(&config.bus.zenoh()).await?);
-        let outcome = conduct(&config, &bus, &input, options, &connect, span).await;
+        let run =
+            Conduct { config: &config, bus: &bus, input: &input, options, connect: &connect, span, out };
+        let outcome = run.to_the_end().await;
         bus.close().await;
         outcome
     })?;
-    collect(team, out, began)
+    let mut result = collect(team, out, began)?;
+    // Only facts can be followed from one journal to another.
+    if let Some(faults) = options.faults.as_ref().filter(|_| result.ledger.is_some()) {
+        let partitions = survived::partitions(&faults.plan);
+        result.survived = Some(survived(team, out, befallen, &result, partitions)?);
+    }
+    Ok(result)
 }
 
 fn executable() -> anyhow::Result<PathBuf> {
@@ -217,64 +252,6 @@ fn with_samples(recording: &Recording, samples: &BTreeMap<RobotId, Vec<Sample>>)
         }
     }
     replaced
-}
-
-/// From launch to the last agent's end.
-async fn conduct(
-    config: &CoordinatorConfig,
-    bus: &Arc<ZenohBus>,
-    input: &[String],
-    options: &ProcessOptions<'_>,
-    connect: &[String],
-    span: (Timestamp, Timestamp),
-) -> anyhow::Result<()> {
-    let agents = Agents::launch(config, bus.clone()).await?;
-    agents.wait_until_alive(ALIVE_WITHIN).await?;
-    feed(config, input, options, connect, span).await?;
-    let settled = agents.wait_until_settled(&std::collections::BTreeSet::new(), SETTLED_WITHIN).await;
-    let ended = agents.shutdown(ENDED_WITHIN).await;
-    settled?;
-    ended?;
-    Ok(())
-}
-
-async fn feed(
-    config: &CoordinatorConfig,
-    input: &[String],
-    options: &ProcessOptions<'_>,
-    connect: &[String],
-    (first, last): (Timestamp, Timestamp),
-) -> anyhow::Result<()> {
-    let mut command = tokio::process::Command::new(executable()?);
-    command.arg("sim-peers").args(input).args(["--team", &config.team, "--progress"]);
-    for endpoint in connect {
-        command.args(["--connect", endpoint]);
-    }
-    if let Some(speed) = options.speed {
-        command.args(["--speed", &speed.to_string()]);
-    }
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).kill_on_drop(true);
-    let mut child = command.spawn().context("cannot start the process that feeds the agents")?;
-    let bar = output::progress(options.label, last.seconds_since(first));
-    if let Some(stdout) = child.stdout.take() {
-        let mut lines = BufReader::new(stdout).lines();
-        while let Some(line) = lines.next_line().await? {
-            if let Ok(second) = line.parse::<f64>() {
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "seconds of a run"
-                )]
-                bar.set_position((second - first.seconds()).max(0.0) as u64);
-            }
-        }
-    }
-    let status = child.wait().await?;
-    bar.finish_and_clear();
-    if !status.success() {
-        bail!("the process that feeds the agents ended with {status}; what it said is above");
-    }
-    Ok(())
 }
 
 /// What the agents left in their folders.
@@ -313,7 +290,7 @@ fn collect(team: &Team, out: &Path, began: Instant) -> anyhow::Result<RunResult>
     write_folder(&with_samples(&team.recording, &received), &recording, Overwrite::Refuse)?;
     setup::write_beside(&team.agents, &recording)?;
     let processes = robots.len();
-    Ok(RunResult { robots, ledger, notes, wall_s, processes })
+    Ok(RunResult { robots, ledger, notes, wall_s, processes, survived: None })
 }
 
 /// Hash of the estimate that a journal gives, and the facts it holds where the strategy keeps any. The facts are

@@ -2,6 +2,7 @@
 //! agents' sensor keys.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use anyhow::bail;
 use pleiad_bus::{Bus, ZenohBus, ZenohConfig, ZenohMode};
@@ -22,6 +23,9 @@ pub fn run(args: &SimPeersArgs) -> anyhow::Result<()> {
     if let Some(speed) = args.speed.filter(|speed| !(speed.is_finite() && *speed > 0.0)) {
         bail!("--speed {speed}: expected a positive number");
     }
+    if !(args.patience.is_finite() && args.patience > 0.0) {
+        bail!("--patience {}: expected a positive number of seconds", args.patience);
+    }
     let recording = if args.input.is_dir() {
         pleiad_recording::open(&setup::recording_folder(&args.input), &ReadOptions::default())?.0
     } else {
@@ -29,7 +33,8 @@ pub fn run(args: &SimPeersArgs) -> anyhow::Result<()> {
         simulate(&scenario, args.seed.unwrap_or(scenario.seed))?.recording
     };
     let samples = recording.robots.iter().map(|(robot, channels)| (*robot, channels.samples())).collect();
-    let options = FeedOptions { step_s: STEP_S, speed: args.speed, ..FeedOptions::default() };
+    let acknowledge_within = Duration::from_secs_f64(args.patience);
+    let options = FeedOptions { step_s: STEP_S, speed: args.speed, acknowledge_within };
     let reports = runtime()?.block_on(async {
         let config = ZenohConfig {
             mode: ZenohMode::Peer,

@@ -79,11 +79,53 @@ fn faults_that_processes_cannot_have_are_refused() {
     for (faults, words) in [
         ("[[fault]]\nwhat = 'cut'\n[[fault]]\nwhat = 'clock'\noffset_s = 0.1\n", "fault[1] is of a clock"),
         ("[[falut]]\nwhat = 'cut'\n", "no [[fault]] table"),
+        (
+            "[[fault]]\nwhat = 'kill'\nrobots = [9]\n",
+            "fault[0].robots names 9; expected robots of this team: 1, 2",
+        ),
+        (
+            "[[fault]]\nwhat = 'kill'\nrobots = [2]\n[[fault]]\nwhat = 'stop'\nrobots = [2]\n",
+            "fault[1] and fault[0] befall the process of robot 2 at the same time",
+        ),
+        (
+            "[[fault]]\nwhat = 'coordinator_dies'\n[[fault]]\nwhat = 'kill'\nrobots = [1]\n",
+            "fault[0] is the death of the coordinator and fault[1] befalls an agent's process",
+        ),
     ] {
         std::fs::write(folder.path().join("faults.toml"), faults).unwrap();
         let stderr = run(folder.path(), ["run", &scenario, "--faults", "faults.toml"]).failure();
         assert!(stderr.contains(words) && stderr.contains("faults.toml"), "{stderr}");
     }
+}
+
+#[test]
+fn faults_of_processes_are_refused_where_there_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = folder.path().join("small.toml");
+    std::fs::write(&scenario, format!("{SCENARIO}\n[[fault]]\nwhat = 'stop'\nrobots = [1]\n")).unwrap();
+    let stderr = run(folder.path(), ["faults", "small.toml"]).failure();
+    for words in ["small.toml: fault[0] is `stop`", "use pleiad run"] {
+        assert!(stderr.contains(words), "{stderr}");
+    }
+    // Random times have to be drawn by whoever knows the whole team.
+    let agent = "team = 'a'\nrobot = 1\n[faults]\nplan = 'random.toml'\n";
+    std::fs::write(folder.path().join("agent.toml"), agent).unwrap();
+    let random = "[[fault]]\nwhat = 'cut'\nevery_s = 10\nfor_s = 1\n";
+    std::fs::write(folder.path().join("random.toml"), random).unwrap();
+    let stderr = run(folder.path(), ["agent", "--config", "agent.toml"]).failure();
+    for words in ["agent.toml: faults.plan", "random.toml", "without every_s"] {
+        assert!(stderr.contains(words), "{stderr}");
+    }
+}
+
+#[test]
+fn what_cannot_be_evicted_is_said() {
+    refused(&["evict", "No", "1", "--connect", "tcp/127.0.0.1:9"], &["No"]);
+    refused(&["evict", "blue", "1", "--connect", "tcp/127.0.0.1:9", "--within", "0"], &["--within 0"]);
+    refused(
+        &["evict", "blue", "1", "--connect", "tcp/127.0.0.1:9"],
+        &["no agent of team blue was found", "--connect"],
+    );
 }
 
 #[test]

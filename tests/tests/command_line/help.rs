@@ -2,16 +2,18 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 11] = [
+const COMMANDS: [&str; 13] = [
     "demo",
     "run",
     "replay",
     "observability",
     "simulate",
     "diagnose",
+    "faults",
     "effects",
     "agent",
     "coordinator",
+    "evict",
     "sim-peers",
     "completions",
 ];

@@ -43,6 +43,7 @@ pub struct FaultsJson {
 pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
     let (base, worlds, notes) = worlds(args)?;
     let seconds = worlds.iter().map(|world| world.seconds).fold(f64::INFINITY, f64::min);
+    let base = of_messages(&base, args, &worlds, seconds)?;
     let levels = levels::levels(&base, &args.loss, &args.burst, seconds)?;
     let window = Window::of(&levels[0].plan, seconds);
     if window.end_s <= window.start_s {
@@ -115,6 +116,26 @@ fn worlds(args: &FaultsArgs) -> anyhow::Result<(FaultPlan, Vec<World>, Vec<Strin
     });
     let worlds = worlds.collect::<anyhow::Result<_>>()?;
     Ok((own.unwrap_or(scenario.faults), worlds, Vec::new()))
+}
+
+/// The faults with everything random drawn, by the first seed; those of processes are refused, since there are
+/// none.
+fn of_messages(
+    plan: &FaultPlan,
+    args: &FaultsArgs,
+    worlds: &[World],
+    seconds: f64,
+) -> anyhow::Result<FaultPlan> {
+    let file = args.faults.as_ref().unwrap_or(&args.input).display();
+    if let Some(index) = plan.rules.iter().position(|rule| rule.fault.is_of_processes()) {
+        let word = plan.rules[index].fault.word();
+        bail!(
+            "{file}: fault[{index}] is `{word}`, of processes, and pleiad faults has none; remove it, or use pleiad run"
+        );
+    }
+    let robots = worlds.iter().flat_map(|world| world.samples.keys().copied()).collect();
+    let seed = worlds.first().map_or(1, |world| world.seed);
+    Ok(plan.scripted(seed, &robots, seconds))
 }
 
 /// One run to be made: a strategy, a level (`None`: no fault at all), a world.
