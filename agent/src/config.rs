@@ -215,8 +215,7 @@ impl AgentConfig {
         if let Some(origin_s) = faults.origin_s {
             finite("faults.origin_s", origin_s)?;
         }
-        let plan =
-            FaultPlan::load(&faults.plan).map_err(|error| ConfigError::Faults(Box::new(error)))?;
+        let plan = FaultPlan::load(&faults.plan).map_err(|error| ConfigError::Faults(Box::new(error)))?;
         if plan.is_random() {
             let expected = "a plan without every_s, such as the one that pleiad run leaves in its folder";
             let found = format!("{:?}", faults.plan.display().to_string());
