@@ -51,10 +51,10 @@ impl ZenohConfig {
             ("mode", mode.to_owned()),
             ("listen/endpoints", list(listen)),
             ("connect/endpoints", list(&self.connect)),
-            // A healed partition is noticed in a fraction of a second.
+            // A healed partition, or an agent that is back, is noticed in half a second.
             (
                 "connect/retry",
-                "{period_init_ms: 200, period_max_ms: 1000, period_increase_factor: 1.5}".into(),
+                "{period_init_ms: 200, period_max_ms: 500, period_increase_factor: 1.5}".into(),
             ),
             // Peers dial in the background for ever; a client needs its router, and waits for it a while.
             ("connect/timeout_ms", "{router: -1, peer: -1, client: 10000}".into()),
@@ -108,7 +108,7 @@ mod tests {
         assert_eq!(setting(&config, "transport/unicast/open_timeout"), 3000);
         let retry = setting(&config, "connect/retry");
         assert_eq!(retry["period_init_ms"], 200);
-        assert_eq!(retry["period_max_ms"], 1000);
+        assert_eq!(retry["period_max_ms"], 500);
         assert_eq!(retry["period_increase_factor"], 1.5);
         assert_eq!(setting(&config, "scouting/gossip/enabled"), true);
     }

@@ -1,9 +1,9 @@
 //! How soon an agent is back after a SIGKILL, and how soon one that comes late is up to date. Real processes
 //! over zenoh on loopback, sensors at the pace of the clock. `docs/benchmarks/faults.md` has the figures.
 //!
-//!     cargo run --release -p pleiad-tests --example rejoin -- killed [ROBOTS] [TIMES]
-//!     cargo run --release -p pleiad-tests --example rejoin -- late [FACTS]
-//!     cargo run --release -p pleiad-tests --example rejoin -- snapshot [FACTS]
+//!     cargo run -p pleiad-tests --example rejoin -- killed [ROBOTS] [TIMES]
+//!     cargo run -p pleiad-tests --example rejoin -- late [FACTS]
+//!     cargo run -p pleiad-tests --example rejoin -- snapshot [FACTS]
 
 #![allow(
     clippy::print_stdout,
@@ -165,7 +165,7 @@ async fn killed(robots: u32, times: u32) {
         team.restart(robot).await.unwrap();
         let back = watch(&stage, robot, &goal, begun).await;
         tell(&robot.to_string(), back);
-        wholes.extend([back.facts, back.whole].into_iter().flatten().reduce(f64::max));
+        wholes.extend(back.facts.zip(back.whole).map(|(facts, whole)| facts.max(whole)));
     }
     pace.abort();
     wholes.sort_by(f64::total_cmp);

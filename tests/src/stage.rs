@@ -173,6 +173,12 @@ impl Stage {
         }
     }
 
+    /// Asks and feeds the agents through another bus from now on.
+    pub async fn reach(&mut self, network: &ZenohConfig) {
+        self.bus.close().await;
+        self.bus = Arc::new(ZenohBus::open(network).await.unwrap());
+    }
+
     /// The robots.
     pub fn robots(&self) -> BTreeSet<RobotId> {
         self.configs.keys().copied().collect()
@@ -236,9 +242,19 @@ impl Stage {
         self.start("agent", &self.config_path(robot))
     }
 
+    /// The same through another program that runs what it is given last, as `ip netns exec NAME` does.
+    pub fn start_agent_through(&self, robot: RobotId, words: &[&str]) -> std::process::Child {
+        let mut command = Command::new(words[0]);
+        command.args(&words[1..]).arg(program::pleiad());
+        self.start_by(command, "agent", &self.config_path(robot))
+    }
+
     fn start(&self, what: &str, config: &Path) -> std::process::Child {
+        self.start_by(Command::new(program::pleiad()), what, config)
+    }
+
+    fn start_by(&self, mut command: Command, what: &str, config: &Path) -> std::process::Child {
         let log = File::create(config.with_extension("log")).unwrap();
-        let mut command = Command::new(program::pleiad());
         command.arg(what).arg("--config").arg(config).current_dir(self.folder.path());
         command.stdin(Stdio::null()).stdout(log.try_clone().unwrap()).stderr(log).spawn().unwrap()
     }

@@ -23,6 +23,8 @@ mod paused;
 mod replayed;
 #[path = "processes/restarted.rs"]
 mod restarted;
+#[path = "processes/snapshot.rs"]
+mod snapshot;
 #[path = "processes/strategies.rs"]
 mod strategies;
 

@@ -164,6 +164,22 @@ fn an_old_boots_trajectory_still_answers_after_a_restart() {
 }
 
 #[test]
+fn a_robot_restarted_after_its_last_odometry_answers_also_what_it_hears_of_later() {
+    let mut node = node(1);
+    let records: Vec<Record> =
+        drive(&mut node, 10.0, 11.0, 0.1).into_iter().flat_map(|handled| handled.journal).collect();
+    let mut node = Node::recover(agent(1).node().unwrap(), 77, records);
+    // Nothing is asked of it yet, so that there is no reason to begin a boot.
+    assert!(handle(&mut node, Event::InputEnded).published.is_empty());
+    let handled = seen(&mut node, &[10.537]);
+    let (boot, state) = state(answers(&handled)[0].1);
+    assert_eq!(boot, BootIndex(0));
+    assert_pose(&state.nominal, &on_circle(start(), 0.537), 1e-12);
+    assert!(node.drained());
+    assert!(handled.published.iter().all(|entry| entry.id.boot == BootIndex(1)));
+}
+
+#[test]
 fn an_answer_completes_the_fact_on_both_sides() {
     let mut seen_one = node(1);
     drive(&mut seen_one, 0.0, 1.0, 0.1);
