@@ -194,11 +194,16 @@ impl Journal {
     }
 }
 
-/// Whether records have to be on the disk itself before anything that follows from them is published: a boot
-/// said to others and forgotten here would be said again with other words.
+/// Whether records have to be on the disk itself before anything that follows from them is published or
+/// done: a boot said to others and forgotten here would be said again with other words, and a promise that
+/// others, or this robot itself, have relied on must outlast the power.
 pub fn must_sync(records: &[Record], robot: RobotId) -> bool {
-    let boot = |record: &Record| matches!(record, Record::Entry(Entry { id, body: Body::Boot(_), .. }) if id.robot == robot);
-    records.iter().any(boot)
+    records.iter().any(|record| match record {
+        Record::Entry(Entry { id, body: Body::Boot(_) | Body::Seal(_) | Body::Vote(_), .. }) => {
+            id.robot == robot
+        }
+        _ => false,
+    })
 }
 
 /// What begins a journal.

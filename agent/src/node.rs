@@ -202,6 +202,7 @@ impl Node {
             match self.ledger.insert(entry.clone()) {
                 Insertion::Added { .. } => {
                     added = true;
+                    self.hear_vote(&entry);
                     self.out.records.push(Record::Entry(entry));
                 }
                 Insertion::Waiting => {
@@ -314,6 +315,8 @@ impl Node {
             && self.membership.joining.is_none()
             && self.ledger.unanswered(self.config.robot).next().is_some()
             && let Some((_, trajectory)) = self.segments.last()
+            && self.membership.joining.is_none()
+            && self.may_begin(Timestamp(trajectory.end().0.0 + 1))
         {
             self.begin_boot(Timestamp(trajectory.end().0.0 + 1));
         }

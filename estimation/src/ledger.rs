@@ -239,11 +239,12 @@ impl Ledger {
         (!member).then_some(Refusal::NotAMember)
     }
 
-    /// From when on what a robot says of itself is taken.
-    fn takes_part(&self, robot: RobotId, time: Timestamp) -> bool {
+    /// Whether what a robot says of itself at `time`, in one of its boots, is taken: within the stay in the
+    /// team to which the boot belongs.
+    fn takes_part(&self, robot: RobotId, boot: BootIndex, time: Timestamp) -> bool {
         let Some(closing) = &self.closing else { return true };
-        let mut stays = closing.views.terms.iter().filter(|term| term.robot == robot).peekable();
-        stays.peek().is_none() || stays.any(|term| time > term.from)
+        let stays = closing.views.terms.iter().filter(|term| term.robot == robot && term.boot <= boot);
+        stays.max_by_key(|term| term.boot).is_none_or(|term| time > term.from)
     }
 
     fn forget_if_empty(&mut self, log: LogId) {
@@ -290,7 +291,7 @@ impl Ledger {
         for (id, log) in self.logs.iter().filter(|(_, log)| log.limit != Some(0)) {
             rebuilt.logs.insert(*id, log.before_base());
         }
-        for log in self.logs.values() {
+        for (_, log) in self.by_stay() {
             let limit = log.limit.unwrap_or(u64::MAX);
             for entry in log.all().filter(|entry| (log.base..limit).contains(&entry.id.sequence.0)) {
                 let entry = other.filter(|other| other.id == entry.id).unwrap_or(entry);
@@ -322,7 +323,7 @@ impl Ledger {
             Body::Vote(vote) => self.hear_vote(id, vote),
             Body::Observation(observation) => {
                 let closed = self.cut().is_some_and(|cut| observation.time <= cut);
-                if closed || !self.takes_part(id.robot, observation.time) {
+                if closed || !self.takes_part(id.robot, id.boot, observation.time) {
                     self.expired += 1;
                     return;
                 }
@@ -367,10 +368,10 @@ impl Ledger {
 
     /// Files an observation of `robot` by the answer held, if any; a former answer's traces go.
     fn resolve(&mut self, id: EntryId, observation: &Observation, robot: RobotId) {
-        if !self.takes_part(robot, observation.time) {
+        let Some((by, answer)) = self.answers.get(&(id, robot)).copied() else { return };
+        if !self.takes_part(robot, by.boot, observation.time) {
             return;
         }
-        let Some((_, answer)) = self.answers.get(&(id, robot)).copied() else { return };
         #[cfg(feature = "planted")]
         let answer = self.mistaken(robot, observation.time, answer);
         self.pending.remove(&id);

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use pleiad_estimation::fact::{
-    Absolute, Answer, Body, Boot, ClockMap, Continuation, Entry, EntryId, Fingerprint, Half, LogId, Noise,
+    Absolute, Answer, Ballot, Body, Boot, ClockMap, Continuation, Entry, EntryId, Fingerprint, Half, LogId, Noise,
     NoiseRef, NominalState, Observation, Profile, Quantity, Seal, SealedLog, VoidReason, Vote,
 };
 use pleiad_estimation::geometry::{Matrix3, Vector3};
@@ -159,6 +159,8 @@ fn seal(rng: &mut impl Rng) -> Seal {
 fn vote(rng: &mut impl Rng) -> Vote {
     Vote {
         epoch: small(rng),
+        ballot: Ballot { round: small(rng), robot: RobotId(small(rng)) },
+        accepted: rng.random(),
         removed: several(rng, |rng| RobotId(small(rng))),
         held: several(rng, |rng| (log(rng), integer(rng))),
         added: several(rng, |rng| (RobotId(small(rng)), BootIndex(small(rng)))),

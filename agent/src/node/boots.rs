@@ -15,7 +15,7 @@ impl Node {
     /// A boot begins; `rebased` is where its trajectory begins if it goes on without a gap.
     pub(super) fn begin_boot_at(&mut self, time: Timestamp, rebased: Option<Pose2>) {
         let joined = self.membership.joining.take();
-        let index = self.next_boot().max(joined.unwrap_or_default());
+        let index = self.next_boot().max(joined.unwrap_or_default()).max(self.first_of_stay());
         let place = self.ledger.settle().member(self.config.robot).map(|member| member.boot);
         let continuation = self.segments.last().map(|(previous, trajectory)| {
             let (end, last) = trajectory.end();

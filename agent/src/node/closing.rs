@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pleiad_estimation::fact::{Body, EntryId, Fingerprint, LogId, Seal, SealedLog};
+use pleiad_estimation::fact::{Body, Entry, EntryId, Fingerprint, LogId, Seal, SealedLog};
 use pleiad_estimation::ledger::{Ledger, Log, Wish, rules};
 use pleiad_estimation::sample::{Sample, SampleRefusal};
 use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
@@ -14,6 +14,8 @@ use super::{Command, Node, Notice, Record};
 
 /// Hashes of own snapshots kept to be compared with those of peers.
 const MOST_HASHES: usize = 64;
+/// Statuses of each member without a vote after which a ballot is given up.
+const BALLOT_STATUSES: usize = 4;
 /// Observations of one robot that may wait for its answer.
 const MOST_UNANSWERED: usize = 4096;
 
@@ -28,6 +30,10 @@ pub(super) struct Membership {
     applicants: BTreeMap<RobotId, BootIndex>,
     /// The last snapshots of this node.
     hashes: BTreeMap<Timestamp, Fingerprint>,
+    /// The latest epoch that a peer has reached.
+    latest_epoch: u32,
+    /// Statuses of peers since a vote was last heard.
+    quiet_statuses: usize,
     /// A peer closed the same time with another result.
     disagrees: bool,
     /// Peers that hold no more of this robot's older logs than it does itself.
@@ -56,6 +62,10 @@ impl Node {
     pub(super) fn check_membership(&mut self) {
         let robot = self.config.robot;
         let Some(views) = self.ledger.views() else { return };
+        if self.membership.joining.is_some() && self.ledger.is_contradicted() {
+            self.begin_ledger_anew();
+            return;
+        }
         if views.is_active(robot) || self.membership.joining.is_some() {
             return;
         }
@@ -67,25 +77,37 @@ impl Node {
         }
         if evicted {
             // What this robot has closed with its own last words is not what the others close.
-            if let Some(closure) = self.ledger.closure().cloned() {
-                self.ledger = Ledger::closing(self.config.fold, closure, robot);
-                self.out.records.extend(self.base_record());
-            }
-            self.membership.hashes.clear();
-            self.membership.disagrees = false;
+            self.begin_ledger_anew();
             self.notice(Notice::Evicted { boot });
         }
+    }
+
+    /// Drops what was closed with words that are not accepted; peers have what is.
+    fn begin_ledger_anew(&mut self) {
+        self.ledger = Self::empty_ledger(&self.config);
+        self.out.records.extend(self.base_record());
+        self.membership.hashes.clear();
+        self.membership.disagrees = false;
     }
 
     pub(super) fn next_boot(&self) -> BootIndex {
         self.known_boot.map_or(BootIndex(0), |known| BootIndex(known.0 + 1))
     }
 
-    /// Whether odometry at `time` may begin the boot this robot was admitted with.
-    pub(super) fn may_join(&self, time: Timestamp) -> bool {
+    /// Whether odometry at `time` may begin a boot: as a member, in the latest epoch anyone is known to have
+    /// reached, with the boot this robot was admitted with if it had asked to be.
+    pub(super) fn may_begin(&self, time: Timestamp) -> bool {
         let Some(views) = self.ledger.views() else { return true };
         let wanted = self.membership.joining.unwrap_or_default();
-        views.active().any(|term| term.robot == self.config.robot && term.boot >= wanted && time > term.from)
+        let mut terms = views.active().filter(|term| term.robot == self.config.robot);
+        views.epoch >= self.membership.latest_epoch
+            && terms.any(|term| term.boot >= wanted && time > term.from)
+    }
+
+    /// The first boot of this robot's present stay in the team.
+    pub(super) fn first_of_stay(&self) -> BootIndex {
+        let mut terms = self.ledger.views().into_iter().flat_map(|views| views.active());
+        terms.find(|term| term.robot == self.config.robot).map_or(BootIndex(0), |term| term.boot)
     }
 
     /// Odometry of a robot that is not of the team: it goes on by itself, so that nothing of its motion is
@@ -137,16 +159,18 @@ impl Node {
         let (observed, answered) = last.map_or(none, |seal| (seal.observed, seal.answered));
         let late_s = if self.input_ended { 0.0 } else { self.config.closing.late_s };
         let mut until = closure.floor(trajectory.end().0.plus_seconds(-late_s));
-        // A vote says from when on a newcomer takes part: nothing later is promised before it is decided.
-        if let Some(vote) = self.ledger.views().and_then(|views| views.vote(self.config.robot)) {
-            until = until.min(vote.from);
+        // Whoever takes part in a ballot seals nothing before the epoch is decided.
+        if let Some(from) = self.ledger.views().and_then(|views| views.held_back(self.config.robot)) {
+            until = until.min(from);
         }
         if until < trajectory.start() {
             until = Timestamp::MIN;
         }
         let until = until.max(observed);
         let answers = self.ledger.answerable().min(until).max(answered);
-        if (until, answers) == (observed, answered) {
+        // A new life says at once how much there is of the earlier ones: before, nobody relies on those.
+        let begun = last.is_none() || self.ledger.sealed_in(self.config.robot) == Some(boot);
+        if (until, answers) == (observed, answered) && begun {
             return false;
         }
         let logs = self.older_logs(boot, until);
@@ -179,7 +203,11 @@ impl Node {
             let end = self.segments.of(old).map(|trajectory| trajectory.end().0);
             self.rebased != Some(old) || end.is_none_or(|end| end <= sealed)
         };
+        // A log of which nothing has reached anyone was lost with the disk.
+        let lost = (self.first_of_stay().0..boot.0).map(|old| LogId { robot, boot: BootIndex(old) });
+        let lost = lost.filter(|id| self.ledger.log(*id).is_none() && !self.ledger.is_forgotten(*id));
         let logs = self.ledger.open_logs(robot).filter(|(id, _)| id.boot < boot);
+        let logs = logs.chain(lost.map(|id| (id, 0)));
         logs.map(|(id, length)| SealedLog { boot: id.boot, length, last: ends(id.boot) }).collect()
     }
 
@@ -190,11 +218,12 @@ impl Node {
         self.membership.evict.retain(|robot| views.is_active(*robot));
         let wish = self.wish();
         let quiet = wish.evict.is_empty() && wish.admit.is_empty() && views.votes.is_empty();
-        if quiet {
+        if quiet || !self.knows_its_past() {
             return false;
         }
         match self.ledger.proposal(&wish) {
             Some(vote) => {
+                self.membership.quiet_statuses = 0;
                 self.say(boot, Body::Vote(vote));
                 true
             }
@@ -208,6 +237,7 @@ impl Node {
             absent: BTreeSet::new(),
             admit: self.membership.applicants.clone(),
             operator: !self.membership.evict.is_empty(),
+            impatient: self.is_impatient(),
         };
         let (Some(limit_s), Some(views), Some((_, trajectory))) =
             (self.config.closing.evict_after_s, self.ledger.views(), self.segments.last())
@@ -233,8 +263,24 @@ impl Node {
         wish
     }
 
+    /// A vote of another: the ballot goes on.
+    pub(super) fn hear_vote(&mut self, entry: &Entry) {
+        if matches!(entry.body, Body::Vote(_)) {
+            self.membership.quiet_statuses = 0;
+        }
+    }
+
+    /// Whether a ballot has led to nothing for so long that this robot tries its own: the members one after
+    /// the other.
+    fn is_impatient(&self) -> bool {
+        let Some(views) = self.ledger.views() else { return false };
+        let rank = views.active().position(|term| term.robot == self.config.robot).unwrap_or(0);
+        self.membership.quiet_statuses > (BALLOT_STATUSES + 2 * rank) * views.active().count()
+    }
+
     fn close(&mut self) -> bool {
-        if self.membership.disagrees {
+        // Whoever is not of the team has said nobody what he relies on: he takes over snapshots of others.
+        if self.membership.disagrees || self.membership.joining.is_some() {
             return false;
         }
         let Some(cut) = self.ledger.closable() else { return false };
@@ -277,6 +323,8 @@ impl Node {
     pub(super) fn peer_closure(&mut self, status: &Status) {
         let Some(theirs) = &status.closure else { return };
         let peer = status.robot;
+        self.membership.quiet_statuses += 1;
+        self.membership.latest_epoch = self.membership.latest_epoch.max(theirs.epoch);
         // Whoever has been evicted without knowing yet may have closed with its own last words.
         let epoch = self.ledger.views().map_or(0, |views| views.epoch);
         if let Some((cut, hash)) = theirs.cut
@@ -293,7 +341,20 @@ impl Node {
         let more = own.filter(|log| {
             self.ledger.log(log.log).map_or(0, Log::held) < log.held && !self.ledger.is_forgotten(log.log)
         });
-        if more.count() == 0 {
+        let later = theirs.cut.is_some_and(|(cut, _)| self.ledger.cut().is_none_or(|ours| cut > ours));
+        let forgotten = theirs.firsts.iter().any(|(log, first)| {
+            log.robot == self.config.robot
+                && self.ledger.log(*log).map_or(0, Log::held) < *first
+                && !self.ledger.is_forgotten(*log)
+        }) || self.misses_forgotten(status, Some(self.config.robot));
+        // From then on the peer relies on nothing of the earlier lives that it had not told by then.
+        let first = self.lived_boots.first();
+        let knows = status.logs.iter().any(|log| {
+            log.log.robot == self.config.robot
+                && log.held > 0
+                && first.is_some_and(|first| log.log.boot >= *first)
+        });
+        if knows && more.count() == 0 && !(forgotten && later) {
             self.membership.caught_up.insert(peer);
         } else {
             self.membership.caught_up.remove(&peer);
@@ -311,24 +372,25 @@ impl Node {
             self.ledger.digests().map(|digest| (digest.log, digest.held)).collect();
         let missing = theirs.firsts.iter().any(|(log, first)| {
             held.get(log).copied().unwrap_or(0) < *first && !self.ledger.is_forgotten(*log)
-        }) || self.misses_forgotten(status);
-        let later = theirs.cut.is_some_and(|(cut, _)| self.ledger.cut().is_none_or(|ours| cut > ours));
+        }) || self.misses_forgotten(status, None)
+            || self.ledger.lacks_accepted();
         if missing && later {
             self.ask_for_snapshot(peer);
         }
     }
 
-    /// Whether a peer has forgotten a log that is not complete here.
-    fn misses_forgotten(&self, status: &Status) -> bool {
+    /// Whether a peer has forgotten a log that is not complete here, of one robot or of any.
+    fn misses_forgotten(&self, status: &Status, of: Option<RobotId>) -> bool {
         let mut lowest: BTreeMap<RobotId, BootIndex> = BTreeMap::new();
-        for log in &status.logs {
+        for log in status.logs.iter().filter(|log| of.is_none_or(|of| log.log.robot == of)) {
             let slot = lowest.entry(log.log.robot).or_insert(log.log.boot);
             *slot = (*slot).min(log.log.boot);
         }
         lowest.into_iter().any(|(robot, boot)| {
-            boot.0
-                .checked_sub(1)
-                .is_some_and(|before| !self.ledger.is_complete(LogId { robot, boot: BootIndex(before) }))
+            let before = boot.0.checked_sub(1).map(|before| LogId { robot, boot: BootIndex(before) });
+            let known = self.ledger.digests().map(|digest| digest.log);
+            let known = known.filter(|log| log.robot == robot && log.boot < boot);
+            before.into_iter().chain(known).any(|log| !self.ledger.is_complete(log))
         })
     }
 
@@ -375,7 +437,12 @@ impl Node {
 
     /// A new journal: what this node would recover from if the old one were thrown away.
     pub fn compacted(&self) -> Vec<Record> {
-        let mut records: Vec<Record> = self.base_record().into_iter().collect();
+        let mut records = Vec::new();
+        if let (Some(_), Some(closure)) = (self.membership.joining, self.ledger.closure()) {
+            let empty = Ledger::closing(self.config.fold, closure.clone(), self.config.robot);
+            records.extend(empty.base().map(|base| Record::Checkpoint(Box::new(base.clone()))));
+        }
+        records.extend(self.base_record());
         records.extend(self.ledger.entries_after_cut().cloned().map(Record::Entry));
         for segment in self.segments.iter() {
             let (boot, odom) = (segment.boot, segment.odom);

@@ -74,7 +74,8 @@ impl Node {
             return Err(OdometryRefusal::OutOfOrder { time: sample.time, last }.into());
         }
         let gap = end.filter(|last| sample.time.seconds_since(*last) > self.config.longest_gap_s);
-        if self.membership.joining.is_some() && !self.may_join(sample.time) {
+        let begins = self.membership.joining.is_some() || self.boot.is_none();
+        if begins && !self.may_begin(sample.time) {
             return self.reckon_alone(sample, gap.is_some());
         }
         if self.membership.joining.is_some() && self.lived && gap.is_none() {

@@ -26,6 +26,7 @@ impl Node {
                         node.known_boot = node.known_boot.max(Some(entry.id.boot));
                         if let Body::Boot(boot) = &entry.body {
                             announced = Some((entry.id.boot, *boot));
+                            node.membership.joining.take_if(|joining| entry.id.boot >= *joining);
                         }
                         if node.corrector.is_some() {
                             said.push(entry.clone());
@@ -38,7 +39,10 @@ impl Node {
                     node.segments.restore(boot, time, state, odom, node.config.history_samples);
                 }
                 Record::Closed(cut) => {
-                    if let Some(hash) = node.ledger.close(cut) {
+                    // What could be closed then can be closed now, or the peers have the snapshot.
+                    if node.ledger.closable().is_some_and(|closable| closable >= cut)
+                        && let Some(hash) = node.ledger.close(cut)
+                    {
                         node.remember_hash(cut, hash);
                         node.segments.forget_until(cut);
                     }
@@ -64,7 +68,9 @@ impl Node {
         self.known_boot = self.known_boot.max(own.map(|log| log.boot).max());
         let (cut, hash) = (checkpoint.time, checkpoint.fingerprint());
         if cut == Timestamp::MIN {
+            // Evicted: it had asked to be admitted, and has not forgotten it.
             self.ledger = Self::empty_ledger(&self.config);
+            self.membership.joining = Some(self.next_boot());
         } else {
             self.ledger.take_over(checkpoint);
             self.segments.forget_until(cut);

@@ -85,6 +85,10 @@ impl Node {
         if self.ledger.cut().is_some_and(|cut| checkpoint.time <= cut) {
             return Ok(());
         }
+        // It may rest on words of one who is given up here.
+        if self.ledger.views().is_some_and(|views| views.given_up(self.config.robot).contains(&peer)) {
+            return Ok(());
+        }
         let own = checkpoint.logs.keys().filter(|log| log.robot == self.config.robot);
         self.known_boot = self.known_boot.max(own.map(|log| log.boot).max());
         let cut = checkpoint.time;

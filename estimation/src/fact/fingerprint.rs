@@ -244,6 +244,8 @@ impl Canonical {
 
     fn vote(&mut self, vote: &Vote) {
         self.word(u64::from(vote.epoch));
+        self.word(u64::from(vote.ballot.round) << 32 | u64::from(vote.ballot.robot.0));
+        self.tag(u8::from(vote.accepted));
         self.word(vote.removed.len() as u64);
         vote.removed.iter().for_each(|robot| self.word(u64::from(robot.0)));
         self.word(vote.held.len() as u64);

@@ -29,19 +29,33 @@ pub struct SealedLog {
     pub last: bool,
 }
 
-/// A vote on who belongs to the team from now on. It takes effect once every member that would stay has
-/// given the same one.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// One attempt of a robot to change the team. Later ones are greater.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Ballot {
+    /// Rounds before it in this epoch.
+    pub round: u32,
+    /// Whose attempt it is.
+    pub robot: RobotId,
+}
+
+/// A vote on who belongs to the team from now on. The robot whose ballot it is asks by promising itself,
+/// proposes by accepting first, and the others follow.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Vote {
     /// How many changes came before.
     pub epoch: u32,
+    /// In which attempt.
+    pub ballot: Ballot,
+    /// The proposal of the ballot is accepted. Otherwise a promise to accept none of an earlier ballot; the
+    /// fields below are then what the promising robot itself holds and has sealed.
+    pub accepted: bool,
     /// Members to be evicted, ascending.
     pub removed: Vec<RobotId>,
-    /// How much of their logs is accepted, ascending.
+    /// How much of their logs is accepted, ascending. A promise relies on nothing beyond.
     pub held: Vec<(LogId, u64)>,
     /// Robots to be admitted, and from which boot on, ascending.
     pub added: Vec<(RobotId, BootIndex)>,
-    /// They take part in what happens after this.
+    /// They take part in what happens after this. A promise seals nothing beyond before the epoch is decided.
     pub from: Timestamp,
     /// An operator wants it: no majority is needed.
     pub operator: bool,

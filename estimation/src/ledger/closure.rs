@@ -27,8 +27,10 @@ pub(super) struct Closing {
     pub views: Views,
     /// Seals after the base, by robot, in the order of their entries.
     pub seals: BTreeMap<RobotId, BTreeMap<EntryId, Seal>>,
-    /// The votes of the changes decided after the base, by epoch.
+    /// The changes decided after the base, by epoch.
     pub decisions: Vec<Decision>,
+    /// The base rests on words of someone evicted that were not accepted.
+    pub contradicted: bool,
     /// Where the logs stood at cuts that some member may not have reached yet.
     pub cuts: Vec<(Timestamp, BTreeMap<LogId, u64>)>,
 }
@@ -36,7 +38,8 @@ pub(super) struct Closing {
 #[derive(Clone, Debug)]
 pub(super) struct Decision {
     vote: Vote,
-    entries: Vec<EntryId>,
+    /// How far the promises of those who went reach.
+    until: Vec<Timestamp>,
 }
 
 impl Ledger {
@@ -76,6 +79,14 @@ impl Ledger {
         let mut ledger = Self::new(config);
         ledger.configuration = configuration(&config, &closure);
         ledger.logs = checkpoint.logs.iter().map(|(id, base)| (*id, Log::from_base(base))).collect();
+        // Who has gone may still have entries beyond, up to where his logs end.
+        let forgotten =
+            |log: &LogId| checkpoint.floors.get(&log.robot).is_some_and(|floor| log.boot < *floor);
+        for (log, held) in checkpoint.views.terms.iter().flat_map(|term| &term.limits) {
+            if !forgotten(log) {
+                ledger.logs.entry(*log).or_default().end_at(*held);
+            }
+        }
         ledger.profiles = checkpoint.profiles.clone();
         ledger.joint = checkpoint.joint.clone();
         let open: Vec<Entry> = checkpoint.open.values().cloned().collect();
@@ -86,12 +97,14 @@ impl Ledger {
             views: checkpoint.views.clone(),
             seals: BTreeMap::new(),
             decisions: Vec::new(),
+            contradicted: false,
             cuts: vec![(checkpoint.time, starts)],
             base: checkpoint,
         }));
         for entry in &open {
             ledger.admit(entry);
         }
+        ledger.decide();
         ledger
     }
 
@@ -121,7 +134,7 @@ impl Ledger {
         let Some(closing) = &self.closing else { return };
         let (closure, owner) = (closing.closure.clone(), closing.owner);
         let mut fresh = Self::from_checkpoint(self.config, closure, owner, checkpoint);
-        for entry in self.logs.values().flat_map(Log::all) {
+        for entry in self.by_stay().into_iter().flat_map(|(_, log)| log.all()) {
             fresh.insert(entry.clone());
         }
         fresh.quarantined = std::mem::take(&mut self.quarantined);
@@ -144,10 +157,23 @@ impl Ledger {
         ended || self.is_forgotten(log)
     }
 
-    /// The logs of a robot that have not ended, and their lengths.
+    /// The logs of a robot that have not ended, or that it has lost before their end, and their lengths.
     pub fn open_logs(&self, robot: RobotId) -> impl Iterator<Item = (LogId, u64)> + '_ {
-        let logs = self.logs.iter().filter(move |(id, log)| id.robot == robot && log.limit.is_none());
+        let open = |log: &Log| log.limit.is_none_or(|limit| log.held() < limit);
+        let logs = self.logs.iter().filter(move |(id, log)| id.robot == robot && open(log));
         logs.map(|(id, log)| (*id, log.held()))
+    }
+
+    /// Whether the snapshot it rests on counts words of someone evicted that were not accepted. Members never
+    /// come to that: they have said what they rely on before it was decided.
+    pub fn is_contradicted(&self) -> bool {
+        self.closing.as_ref().is_some_and(|closing| closing.contradicted)
+    }
+
+    /// Whether a change is decided that cannot take effect here, because entries that it accepts are missing.
+    pub fn lacks_accepted(&self) -> bool {
+        let decided = self.closing.as_ref().and_then(|closing| closing.views.decided());
+        decided.is_some_and(|vote| vote.held.iter().any(|(log, held)| !self.holds(*log, *held)))
     }
 
     /// The membership as far as it is known here.
@@ -182,19 +208,12 @@ impl Ledger {
 
     /// Whether a seal counts: everything it speaks of is held, and nothing speaks against its author.
     fn counts_here(&self, closing: &Closing, id: EntryId, seal: &Seal) -> bool {
-        let logs =
-            seal.logs.iter().all(|log| self.holds(LogId { robot: id.robot, boot: log.boot }, log.length));
-        // Whoever has voted to evict a robot no longer rests on what came from it later.
-        let voted = closing.views.vote(closing.owner);
-        let given_up = voted.is_some_and(|vote| {
-            vote.removed.contains(&id.robot)
-                && vote
-                    .held
-                    .iter()
-                    .find(|(log, _)| *log == id.log())
-                    .is_none_or(|(_, held)| id.sequence.0 >= *held)
+        let of = |boot| LogId { robot: id.robot, boot };
+        let logs = seal.logs.iter().all(|log| {
+            let ends = self.logs.get(&of(log.boot)).and_then(|log| log.limit);
+            self.holds(of(log.boot), rules::needed(log.length, ends))
         });
-        logs && !given_up
+        logs && closing.views.relies_on(closing.owner, id)
     }
 
     fn standing(&self, closing: &Closing, term: &Term) -> Standing {
@@ -203,7 +222,16 @@ impl Ledger {
         let later = closing.seals.get(&term.robot).into_iter().flatten();
         // A log is said to have ended once, so that a later seal rests on what earlier ones speak of.
         let of_term = base.into_iter().chain(later).filter(|(id, _)| id.boot >= term.boot);
-        let counting = of_term.take_while(|(id, seal)| self.counts_here(closing, **id, seal));
+        // Nor does it rest on an earlier life before the present one has said how much of that there is.
+        let logs = self.logs.iter().filter(|(id, log)| id.robot == term.robot && log.held() > 0);
+        let life = logs.map(|(id, _)| id.boot).max().unwrap_or_default();
+        let sealed = closing.seals.get(&term.robot).and_then(|seals| seals.keys().next_back());
+        let covered = |id: &EntryId| {
+            id.boot >= life
+                || sealed.is_some_and(|last| last.boot >= life)
+                || closing.base.logs.get(&id.log()).is_none_or(|base| id.sequence.0 < base.start)
+        };
+        let counting = of_term.take_while(|(id, seal)| covered(id) && self.counts_here(closing, **id, seal));
         if let Some((_, seal)) = counting.last() {
             standing.observed = seal.observed;
             standing.answered = seal.answered;
@@ -285,22 +313,25 @@ impl Ledger {
     pub(super) fn decide(&mut self) {
         loop {
             let Some(closing) = &self.closing else { return };
-            let Some((vote, entries)) = closing.views.decided() else { return };
+            let Some(vote) = closing.views.decided() else { return };
             if !vote.held.iter().all(|(log, held)| self.holds(*log, *held)) {
                 return;
             }
             let vote = vote.clone();
-            let sealed: BTreeMap<RobotId, Timestamp> =
-                vote.removed.iter().map(|robot| (*robot, sealed_within(closing, *robot, &vote))).collect();
+            let reach = |robot: &RobotId| sealed_within(closing, *robot, &vote);
+            let until: Vec<Timestamp> = vote.removed.iter().map(reach).collect();
             let gone: Vec<LogId> =
                 self.logs.keys().copied().filter(|log| vote.removed.contains(&log.robot)).collect();
             if let Some(closing) = &mut self.closing {
-                closing.views.apply(&vote, |robot| sealed.get(&robot).copied().unwrap_or(Timestamp::MIN));
-                closing.decisions.push(Decision { vote: vote.clone(), entries });
+                closing.views.apply(&vote, &until);
+                closing.decisions.push(Decision { vote: vote.clone(), until });
             }
             for id in gone {
                 let limit = vote.held.iter().find(|(log, _)| *log == id).map_or(0, |(_, held)| *held);
                 if let Some(log) = self.logs.get_mut(&id) {
+                    if let Some(closing) = self.closing.as_mut().filter(|_| log.base > limit) {
+                        closing.contradicted = true;
+                    }
                     self.truncated |= log.end_at(limit);
                     // What nobody vouches for was never there.
                     if limit == 0 && log.held() == 0 {
@@ -332,21 +363,35 @@ impl Ledger {
 
     /// Everything kept beyond the last cut, to be written to a new journal after the snapshot.
     pub fn entries_after_cut(&self) -> impl Iterator<Item = &Entry> {
-        self.logs
-            .values()
-            .flat_map(Log::all)
-            .filter(|entry| self.logs.get(&entry.id.log()).is_some_and(|log| entry.id.sequence.0 >= log.base))
+        let after = |log: &Log, entry: &Entry| entry.id.sequence.0 >= log.base;
+        self.by_stay().into_iter().flat_map(move |(_, log)| log.all().filter(move |entry| after(log, entry)))
+    }
+
+    /// The logs in an order in which they can be taken: those of who came later after the votes that admitted
+    /// him.
+    pub(super) fn by_stay(&self) -> Vec<(LogId, &Log)> {
+        let from = |id: &LogId| {
+            let terms = self.closing.iter().flat_map(|closing| &closing.views.terms);
+            let of = terms.filter(|term| term.robot == id.robot && term.boot <= id.boot);
+            of.max_by_key(|term| term.boot).map_or(Timestamp::MIN, |term| term.from)
+        };
+        let mut logs: Vec<(LogId, &Log)> = self.logs.iter().map(|(id, log)| (*id, log)).collect();
+        logs.sort_by_key(|(id, _)| (from(id), *id));
+        logs
     }
 }
 
-/// How far an evicted robot's promises reach within what is accepted of its logs.
+/// How far an evicted robot's promises of its present stay reach within what is accepted of its logs.
 fn sealed_within(closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
+    let Some(term) = closing.views.active().find(|term| term.robot == robot) else { return Timestamp::MIN };
     let accepted =
         |id: &EntryId| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
-    let later = closing.seals.get(&robot).into_iter().flatten();
-    let seal = later.rev().find(|(id, _)| accepted(id)).map(|(_, seal)| seal);
-    let seal = seal.or_else(|| closing.base.seals.get(&robot).map(|(_, seal)| seal));
-    seal.map_or(Timestamp::MIN, |seal| closing.closure.floor(seal.observed.min(seal.answered)))
+    let later = closing.seals.get(&robot).into_iter().flatten().filter(|(id, _)| accepted(id));
+    let seals = closing.base.seals.get(&robot).map(|(id, seal)| (id, seal)).into_iter().chain(later);
+    let seal = seals.filter(|(id, _)| id.boot >= term.boot).last();
+    let until =
+        seal.map_or(Timestamp::MIN, |(_, seal)| closing.closure.floor(seal.observed.min(seal.answered)));
+    until.max(term.from)
 }
 
 fn configuration(config: &FoldConfig, closure: &Closure) -> u64 {

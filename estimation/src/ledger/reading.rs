@@ -6,7 +6,7 @@ use super::{FactRecord, Ledger, Log, LogDigest};
 use crate::fact::{Entry, EntryId, Fingerprint, LogId, Quantity, VoidReason};
 use crate::fold::FactKey;
 use crate::joint::Joint;
-use crate::{RobotId, Timestamp};
+use crate::{BootIndex, RobotId, Timestamp};
 
 impl Ledger {
     /// The estimate as of the last [`Ledger::settle`].
@@ -39,7 +39,8 @@ impl Ledger {
         self.pending
             .iter()
             .filter(move |(_, observation)| {
-                Self::names(observation, robot) && self.takes_part(robot, observation.time)
+                Self::names(observation, robot)
+                    && self.takes_part(robot, BootIndex(u32::MAX), observation.time)
             })
             .map(|(id, observation)| (*id, observation.time))
     }

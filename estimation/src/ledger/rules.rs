@@ -4,6 +4,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::fact::Ballot;
 use crate::{RobotId, Timestamp};
 
 /// What a team agrees on to close its past.
@@ -49,6 +50,33 @@ pub fn answerable(members: impl IntoIterator<Item = Standing>, owed: Option<Time
 pub fn final_until(members: impl IntoIterator<Item = Standing>) -> Timestamp {
     let promised = |member: Standing| member.observed.min(member.answered).max(member.from);
     members.into_iter().map(promised).min().unwrap_or(Timestamp::MIN)
+}
+
+/// How much of a log a seal asks for before it counts: what it says its length is, or less if the robot has
+/// said later that the log ends earlier, nobody holding more of it.
+pub fn needed(said: u64, ends: Option<u64>) -> u64 {
+    ends.map_or(said, |ends| said.min(ends))
+}
+
+/// Whether a robot that has promised `promised` last may promise `asked`: to accept nothing earlier any more.
+pub fn may_promise(promised: Option<Ballot>, asked: Ballot) -> bool {
+    promised.is_none_or(|promised| asked > promised)
+}
+
+/// Whether it may accept what is proposed in `ballot`.
+pub fn may_accept(promised: Option<Ballot>, ballot: Ballot) -> bool {
+    promised.is_none_or(|promised| ballot >= promised)
+}
+
+/// What a robot must propose in `ballot` once all who would stay have promised it: what any of them has
+/// accepted in the latest ballot before. Its own wish only if there is no such thing.
+pub fn bound<'a, V>(accepted: impl IntoIterator<Item = (Ballot, &'a V)>, ballot: Ballot) -> Option<&'a V> {
+    accepted.into_iter().filter(|(of, _)| *of < ballot).max_by_key(|(of, _)| *of).map(|(_, value)| value)
+}
+
+/// Whether a proposal is decided that so many of those who would stay have accepted.
+pub fn is_decided(members: usize, staying: usize, accepting: usize, operator: bool) -> bool {
+    may_decide(members, accepting, false) || (operator && accepting > 0 && accepting == staying)
 }
 
 /// Whether those who would stay may decide without those who would go.

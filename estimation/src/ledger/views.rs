@@ -1,9 +1,9 @@
-//! Who belongs to the team, and when: changes are decided by those who stay, all of them.
+//! Who belongs to the team, and when: in each epoch one change is decided, by ballots.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::rules::may_decide;
-use crate::fact::{EntryId, LogId, Vote};
+use super::rules;
+use crate::fact::{Ballot, EntryId, LogId, Vote};
 use crate::{BootIndex, RobotId, Sequence, Timestamp};
 
 /// One stay of a robot in the team.
@@ -43,13 +43,8 @@ impl Views {
         self.active().any(|term| term.robot == robot)
     }
 
-    /// A robot's last vote in this epoch.
-    pub fn vote(&self, robot: RobotId) -> Option<&Vote> {
-        self.votes_of(robot).last().map(|(_, vote)| vote)
-    }
-
     /// A robot's votes in this epoch, in the order in which it gave them.
-    fn votes_of(&self, robot: RobotId) -> impl DoubleEndedIterator<Item = (EntryId, &Vote)> {
+    pub(super) fn votes_of(&self, robot: RobotId) -> impl DoubleEndedIterator<Item = (EntryId, &Vote)> {
         let first = EntryId { robot, boot: BootIndex(0), sequence: Sequence(0) };
         let last = EntryId { robot, boot: BootIndex(u32::MAX), sequence: Sequence(u64::MAX) };
         self.votes.range((self.epoch, first)..=(self.epoch, last)).map(|((_, id), vote)| (*id, vote))
@@ -61,35 +56,59 @@ impl Views {
         }
     }
 
-    /// The change that everyone who would stay has voted for alike, and the entries they did it in. Whoever
-    /// has given more robots up since does not count; whoever has only raised a number does, and the first
-    /// such vote is the one.
-    pub fn decided(&self) -> Option<(&Vote, Vec<EntryId>)> {
-        let members = self.active().count();
-        let voters = self.active().map(|term| term.robot);
-        for (_, vote) in voters.flat_map(|robot| self.votes_of(robot)) {
-            let staying: Vec<RobotId> =
-                self.active().map(|term| term.robot).filter(|robot| !vote.removed.contains(robot)).collect();
-            if !may_decide(members, staying.len(), vote.operator) {
-                continue;
-            }
-            let given = |robot: &RobotId| {
-                self.vote(*robot).filter(|last| last.removed == vote.removed)?;
-                self.votes_of(*robot).find(|(_, given)| *given == vote).map(|(id, _)| id)
-            };
-            if let Some(entries) = staying.iter().map(given).collect() {
-                return Some((vote, entries));
-            }
-        }
-        None
+    /// What a robot has promised in this epoch, the last ballot last.
+    pub fn promises(&self, robot: RobotId) -> impl DoubleEndedIterator<Item = &Vote> {
+        self.votes_of(robot).map(|(_, vote)| vote).filter(|vote| !vote.accepted)
     }
 
-    /// Puts a decided change into effect; `sealed` is how far an evicted robot's promises reach within what
-    /// is accepted of its logs.
-    pub(super) fn apply(&mut self, vote: &Vote, sealed: impl Fn(RobotId) -> Timestamp) {
+    /// The latest ballot a robot takes part in.
+    pub fn ballot(&self, robot: RobotId) -> Option<Ballot> {
+        self.votes_of(robot).map(|(_, vote)| vote.ballot).max()
+    }
+
+    /// Beyond this a robot seals nothing before the epoch is decided.
+    pub fn held_back(&self, robot: RobotId) -> Option<Timestamp> {
+        self.promises(robot).map(|vote| vote.from).min()
+    }
+
+    /// Robots that a robot has given up in this epoch.
+    pub fn given_up(&self, robot: RobotId) -> BTreeSet<RobotId> {
+        self.promises(robot).flat_map(|vote| vote.removed.iter().copied()).collect()
+    }
+
+    /// Whether a robot relies on an entry of another: not if it has given that one up, and has not said that
+    /// it held the entry when it did.
+    pub fn relies_on(&self, robot: RobotId, id: EntryId) -> bool {
+        let within =
+            |vote: &Vote| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
+        self.promises(robot).all(|vote| !vote.removed.contains(&id.robot) || within(vote))
+    }
+
+    /// Members that a vote lets stay.
+    pub(super) fn staying(&self, vote: &Vote) -> impl Iterator<Item = RobotId> {
+        self.active().map(|term| term.robot).filter(|robot| !vote.removed.contains(robot))
+    }
+
+    /// The change of this epoch, once enough of those who stay have accepted it in one ballot. There is never
+    /// another one, see `docs/ledger.md`.
+    pub fn decided(&self) -> Option<&Vote> {
+        let members = self.active().count();
+        let voters = self.active().map(|term| term.robot);
+        let mut accepted = voters.flat_map(|robot| self.votes_of(robot)).map(|(_, vote)| vote);
+        accepted.find(|vote| {
+            let gives = |robot: &RobotId| self.votes_of(*robot).any(|(_, given)| given == *vote);
+            let accepting = self.staying(vote).filter(gives).count();
+            vote.accepted && rules::is_decided(members, self.staying(vote).count(), accepting, vote.operator)
+        })
+    }
+
+    /// Puts a decided change into effect; `until` is how far the promises of those who go reach within what
+    /// is accepted of their logs.
+    pub(super) fn apply(&mut self, vote: &Vote, until: &[Timestamp]) {
         for term in &mut self.terms {
-            if term.until.is_none() && vote.removed.contains(&term.robot) {
-                term.until = Some(sealed(term.robot).max(term.from));
+            let goes = vote.removed.iter().zip(until).find(|(robot, _)| **robot == term.robot);
+            if let (None, Some((_, until))) = (term.until, goes) {
+                term.until = Some(*until);
                 term.limits = vote.held.iter().copied().filter(|(log, _)| log.robot == term.robot).collect();
             }
         }

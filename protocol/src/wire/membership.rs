@@ -1,6 +1,6 @@
 //! Seals and votes.
 
-use pleiad_estimation::fact::{Seal, SealedLog, Vote};
+use pleiad_estimation::fact::{Ballot, Seal, SealedLog, Vote};
 use pleiad_estimation::{BootIndex, RobotId, Timestamp};
 use serde::{Deserialize, Serialize};
 
@@ -17,10 +17,13 @@ pub struct WireSeal {
     logs: Vec<(u32, u64, bool)>,
 }
 
-/// A vote.
+/// A vote in the ballot `(round, of)`.
 #[derive(Serialize, Deserialize)]
 pub struct WireVote {
     epoch: u32,
+    round: u32,
+    of: u32,
+    accepted: bool,
     removed: Vec<u32>,
     held: Vec<(WireLog, u64)>,
     added: Vec<(u32, u32)>,
@@ -60,6 +63,9 @@ impl From<&Vote> for WireVote {
     fn from(vote: &Vote) -> Self {
         Self {
             epoch: vote.epoch,
+            round: vote.ballot.round,
+            of: vote.ballot.robot.0,
+            accepted: vote.accepted,
             removed: vote.removed.iter().map(|robot| robot.0).collect(),
             held: vote.held.iter().map(|(log, held)| ((*log).into(), *held)).collect(),
             added: vote.added.iter().map(|(robot, boot)| (robot.0, boot.0)).collect(),
@@ -82,6 +88,8 @@ impl TryFrom<WireVote> for Vote {
         }
         Ok(Self {
             epoch: wire.epoch,
+            ballot: Ballot { round: wire.round, robot: RobotId(wire.of) },
+            accepted: wire.accepted,
             removed: wire.removed.into_iter().map(RobotId).collect(),
             held: wire.held.into_iter().map(|(log, held)| (log.into(), held)).collect(),
             added: wire.added.into_iter().map(|(robot, boot)| (RobotId(robot), BootIndex(boot))).collect(),

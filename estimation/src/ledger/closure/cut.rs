@@ -2,17 +2,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Closing, Decision, sealed_within};
-use crate::fact::{Body, Entry, EntryId, LogId};
+use super::{Closing, Decision};
+use crate::fact::{Body, Entry, EntryId, LogId, SealedLog};
 use crate::fold::{FactKey, fold};
-use crate::ledger::Ledger;
 use crate::ledger::checkpoint::{Checkpoint, LogBase};
+use crate::ledger::{Ledger, rules};
 use crate::{BootIndex, RobotId, Timestamp};
 
 impl Ledger {
     pub(super) fn checkpoint_at(&self, closing: &Closing, cut: Timestamp) -> Checkpoint {
         let base = &closing.base;
-        let (positions, limits) = Self::positions_at(closing, cut);
+        let (positions, limits) = self.positions_at(closing, cut);
         let position = |id: &LogId| positions.get(id).copied().unwrap_or(0);
         let mut joint = base.joint.clone();
         let mut counts = base.counts;
@@ -60,9 +60,9 @@ impl Ledger {
                 Body::Boot(_) | Body::Observation(_) | Body::Half(_) => {}
             }
         }
-        while let Some((vote, _)) = views.decided() {
-            let vote = vote.clone();
-            views.apply(&vote, |robot| sealed_within(closing, robot, &vote));
+        let needed = closing.decisions.iter().rposition(|decision| decision.is_needed(cut));
+        for Decision { vote, until } in closing.decisions.iter().take(needed.map_or(0, |last| last + 1)) {
+            views.apply(vote, until);
         }
         views.terms.retain(|term| term.until.is_none_or(|until| until >= cut));
 
@@ -74,7 +74,21 @@ impl Ledger {
             }
         }
         let mut floors = base.floors.clone();
-        forget_ended(&mut logs, &mut floors, &open);
+        // An answer to an entry of a forgotten log is over too, and may have been the last to keep a log.
+        loop {
+            let kept = open.len();
+            forget_ended(&mut logs, &mut floors, &open);
+            open.retain(|_, entry| match &entry.body {
+                Body::Half(half) => {
+                    let of = half.observation;
+                    floors.get(&of.robot).is_none_or(|floor| of.boot >= *floor)
+                }
+                _ => true,
+            });
+            if open.len() == kept {
+                break;
+            }
+        }
         let kept = |id: &LogId| logs.contains_key(id) || open.keys().any(|open| open.log() == *id);
         profiles.retain(|(id, _), _| kept(id));
         clocks.retain(|id, _| kept(id));
@@ -126,8 +140,12 @@ impl Ledger {
     }
 
     /// How far each log is accounted for at a cut, and where logs end: of every member up to its first seal
-    /// that reaches the cut; of evicted ones all that is accepted; and the votes that decided who is who.
-    fn positions_at(closing: &Closing, cut: Timestamp) -> (BTreeMap<LogId, u64>, BTreeMap<LogId, u64>) {
+    /// that reaches the cut; of evicted ones all that is accepted.
+    fn positions_at(
+        &self,
+        closing: &Closing,
+        cut: Timestamp,
+    ) -> (BTreeMap<LogId, u64>, BTreeMap<LogId, u64>) {
         let base = &closing.base;
         let mut positions: BTreeMap<LogId, u64> =
             base.logs.iter().map(|(id, log)| (*id, log.start)).collect();
@@ -154,47 +172,23 @@ impl Ledger {
             }
             let seals = closing.seals.get(&term.robot).into_iter().flatten();
             for (id, seal) in seals.filter(|(id, _)| id.boot >= term.boot) {
-                for log in &seal.logs {
+                let said = |log: &SealedLog| {
                     let of = LogId { robot: id.robot, boot: log.boot };
-                    if log.last && !forgotten(of) {
-                        limits.insert(of, log.length);
-                        raise(of, log.length);
+                    let ends = self.logs.get(&of).and_then(|log| log.limit);
+                    (of, rules::needed(log.length, ends))
+                };
+                for (of, length) in seal.logs.iter().filter(|log| log.last).map(said) {
+                    if !forgotten(of) {
+                        limits.insert(of, length);
+                        raise(of, length);
                     }
                 }
                 if seal.observed.min(seal.answered) >= cut {
                     raise(id.log(), id.sequence.0 + 1);
-                    for log in &seal.logs {
-                        raise(LogId { robot: id.robot, boot: log.boot }, log.length);
-                    }
+                    seal.logs.iter().map(said).for_each(|(of, length)| raise(of, length));
                     break;
                 }
             }
-        }
-        let mut needed = false;
-        for Decision { vote, entries } in closing.decisions.iter().rev() {
-            let ended = |robot: &RobotId| {
-                let terms = closing.views.terms.iter().filter(|term| term.robot == *robot);
-                terms.filter_map(|term| term.until).any(|until| until < cut)
-            };
-            needed |= vote.removed.iter().any(ended) || (!vote.added.is_empty() && vote.from < cut);
-            if needed {
-                for id in entries {
-                    raise(id.log(), id.sequence.0 + 1);
-                }
-            }
-        }
-        // Votes can lie beyond the first seal that reaches the cut, and more seals before them.
-        let accounted = |id: &EntryId| positions.get(&id.log()).is_some_and(|to| id.sequence.0 < *to);
-        let seals = closing.seals.values().flatten().filter(|(id, _)| accounted(id));
-        let ended = seals.flat_map(|(id, seal)| {
-            let last = seal.logs.iter().filter(|log| log.last);
-            last.map(|log| (LogId { robot: id.robot, boot: log.boot }, log.length))
-        });
-        let ended: Vec<(LogId, u64)> = ended.filter(|(log, _)| !forgotten(*log)).collect();
-        for (log, length) in ended {
-            limits.entry(log).or_insert(length);
-            let position = positions.entry(log).or_insert(0);
-            *position = (*position).max(length);
         }
         (positions, limits)
     }
@@ -258,6 +252,14 @@ impl Ledger {
             }
         }
         closing.cuts.drain(..last);
+    }
+}
+
+impl Decision {
+    /// Whether a cut rests on it: it is after what someone who went has promised, or someone who came takes
+    /// part in it.
+    fn is_needed(&self, cut: Timestamp) -> bool {
+        self.until.iter().any(|until| *until < cut) || (!self.vote.added.is_empty() && self.vote.from < cut)
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::fact::{LogId, Vote};
-use crate::ledger::Ledger;
+use crate::fact::{Ballot, LogId, Vote};
+use crate::ledger::closure::Closing;
+use crate::ledger::{Ledger, rules};
 use crate::{BootIndex, RobotId, Timestamp};
 
 /// What a robot would change about the team.
@@ -17,64 +18,130 @@ pub struct Wish {
     pub admit: BTreeMap<RobotId, BootIndex>,
     /// It is an operator's.
     pub operator: bool,
+    /// The ballots so far have led to nothing for long enough.
+    pub impatient: bool,
 }
 
 impl Ledger {
-    /// What the owner has to vote, if it is not what it has voted already: its own wishes joined with the
-    /// votes it agrees to. Later votes of a robot only ever contain more.
+    /// What the owner has to vote next, if anything.
     pub fn proposal(&self, wish: &Wish) -> Option<Vote> {
         let closing = self.closing.as_ref()?;
+        if !closing.views.is_active(closing.owner) || closing.views.decided().is_some() {
+            return None;
+        }
+        let vote = self.accept(closing).or_else(|| self.propose(closing, wish));
+        vote.or_else(|| self.promise(closing, wish)).or_else(|| self.begin(closing, wish))
+    }
+
+    /// Follows what another has proposed in its ballot.
+    fn accept(&self, closing: &Closing) -> Option<Vote> {
         let (views, owner) = (&closing.views, closing.owner);
-        if !views.is_active(owner) {
+        let promised = views.ballot(owner);
+        let proposals = views.active().flat_map(|term| views.votes_of(term.robot));
+        let mut proposals = proposals.map(|(_, vote)| vote).filter(|vote| vote.accepted);
+        let fresh = |vote: &Vote| !views.votes_of(owner).any(|(_, given)| given == vote);
+        proposals
+            .find(|vote| {
+                !vote.removed.contains(&owner) && rules::may_accept(promised, vote.ballot) && fresh(vote)
+            })
+            .cloned()
+    }
+
+    /// Proposes in its own ballot, once all who would stay have promised it.
+    fn propose(&self, closing: &Closing, wish: &Wish) -> Option<Vote> {
+        let (views, owner) = (&closing.views, closing.owner);
+        let asked = views.promises(owner).next_back().filter(|vote| vote.ballot.robot == owner)?;
+        let ballot = asked.ballot;
+        if views.ballot(owner) != Some(ballot)
+            || views.votes_of(owner).any(|(_, vote)| vote.accepted && vote.ballot == ballot)
+        {
             return None;
         }
-        let own = views.vote(owner);
-        let mut joined = own.cloned().unwrap_or_default();
-        let mut removed: BTreeSet<RobotId> = joined.removed.iter().copied().collect();
-        let mut added: BTreeMap<RobotId, BootIndex> = joined.added.iter().copied().collect();
-        removed.extend(wish.evict.iter().filter(|robot| **robot != owner && views.is_active(**robot)));
-        added.extend(wish.admit.iter().filter(|(robot, _)| !views.is_active(**robot)));
-        joined.operator |= wish.operator && !wish.evict.is_empty();
-        let mut held: BTreeMap<LogId, u64> = joined.held.iter().copied().collect();
-        let mut from = joined.from;
-        for term in views.active().filter(|term| term.robot != owner) {
-            if removed.contains(&term.robot) {
-                continue;
-            }
-            let Some(vote) = views.vote(term.robot) else { continue };
-            let agreed = vote.operator
-                || vote.removed.iter().all(|robot| removed.contains(robot) || wish.absent.contains(robot));
-            if vote.removed.contains(&owner) || !agreed {
-                continue;
-            }
-            removed.extend(&vote.removed);
-            for (robot, boot) in &vote.added {
-                let slot = added.entry(*robot).or_insert(*boot);
-                *slot = (*slot).max(*boot);
-            }
-            for (log, length) in vote.held.iter().filter(|(log, length)| self.holds(*log, *length)) {
-                let slot = held.entry(*log).or_insert(*length);
-                *slot = (*slot).max(*length);
-            }
-            joined.operator |= vote.operator;
-            from = from.max(vote.from);
+        let promise = |robot| views.promises(robot).find(|vote| vote.ballot == ballot);
+        let promises: Vec<&Vote> = views.staying(asked).map(promise).collect::<Option<_>>()?;
+        let accepted = views.staying(asked).flat_map(|robot| views.votes_of(robot));
+        let accepted = accepted.map(|(_, vote)| (vote.ballot, vote)).filter(|(_, vote)| vote.accepted);
+        if let Some(bound) = rules::bound(accepted, ballot) {
+            return Some(Vote { ballot, ..bound.clone() });
         }
-        if removed.is_empty() && added.is_empty() {
+        let mut held: BTreeMap<LogId, u64> = BTreeMap::new();
+        for (log, length) in promises.iter().flat_map(|vote| &vote.held) {
+            let slot = held.entry(*log).or_insert(0);
+            *slot = (*slot).max(*length);
+        }
+        let admit = wish.admit.iter().filter(|(robot, _)| !views.is_active(**robot));
+        Some(Vote {
+            accepted: true,
+            held: held.into_iter().collect(),
+            added: admit.map(|(robot, boot)| (*robot, *boot)).collect(),
+            from: promises.iter().map(|vote| vote.from).max().unwrap_or(Timestamp::MIN),
+            ..asked.clone()
+        })
+    }
+
+    /// Promises the latest ballot of another, if it agrees to do without those who are to go.
+    fn promise(&self, closing: &Closing, wish: &Wish) -> Option<Vote> {
+        let (views, owner) = (&closing.views, closing.owner);
+        let promised = views.ballot(owner);
+        let given_up = views.given_up(owner);
+        let asked = views.active().filter_map(|term| {
+            views.promises(term.robot).next_back().filter(|vote| vote.ballot.robot == term.robot)
+        });
+        let agreed = |vote: &&Vote| {
+            let gone = |robot: &RobotId| {
+                wish.evict.contains(robot) || wish.absent.contains(robot) || given_up.contains(robot)
+            };
+            !vote.removed.contains(&owner)
+                && rules::may_promise(promised, vote.ballot)
+                && (vote.operator || vote.removed.iter().all(gone))
+        };
+        let asked = asked.filter(agreed).max_by_key(|vote| vote.ballot)?;
+        Some(self.promise_of(closing, asked.ballot, asked.removed.clone(), asked.operator))
+    }
+
+    /// Begins a ballot of its own, if it wants something that the ballots so far do not bring.
+    fn begin(&self, closing: &Closing, wish: &Wish) -> Option<Vote> {
+        let (views, owner) = (&closing.views, closing.owner);
+        let latest = views.active().filter_map(|term| views.ballot(term.robot)).max();
+        let under_way =
+            views.active().flat_map(|term| views.promises(term.robot)).max_by_key(|vote| vote.ballot);
+        let evict: BTreeSet<RobotId> =
+            wish.evict.iter().copied().filter(|robot| *robot != owner && views.is_active(*robot)).collect();
+        // Once by itself; after that two robots that want different things would outbid one another for ever.
+        let first = !views.promises(owner).any(|vote| vote.ballot.robot == owner);
+        let more = under_way.is_none_or(|vote| !evict.iter().all(|robot| vote.removed.contains(robot)));
+        let admit = wish.admit.keys().any(|robot| !views.is_active(*robot));
+        let wanted = !evict.is_empty() || admit;
+        let begins = (wanted && under_way.is_none())
+            || (!evict.is_empty() && more && first)
+            || (wish.impatient && (wanted || under_way.is_some()));
+        if !begins {
             return None;
         }
-        let known = self.logs.iter().filter(|(_, log)| log.held() > 0);
-        for (id, log) in known.filter(|(id, _)| removed.contains(&id.robot)) {
-            held.entry(*id).or_insert(log.held());
+        let members = views.active().count();
+        let joined: BTreeSet<RobotId> = evict.union(&views.given_up(owner)).copied().collect();
+        let operator = (wish.operator && !evict.is_empty()) || under_way.is_some_and(|vote| vote.operator);
+        let possible = |removed: &BTreeSet<RobotId>| {
+            rules::may_decide(members, members - removed.len(), operator && !removed.is_empty())
+        };
+        let removed = [joined, evict, BTreeSet::new()].into_iter().find(possible)?;
+        let ballot = Ballot { round: latest.map_or(1, |latest| latest.round + 1), robot: owner };
+        let operator = operator && !removed.is_empty();
+        Some(self.promise_of(closing, ballot, removed.into_iter().collect(), operator))
+    }
+
+    /// A promise: what is held here of the logs of those who are to go, and how far this robot has sealed.
+    fn promise_of(&self, closing: &Closing, ballot: Ballot, removed: Vec<RobotId>, operator: bool) -> Vote {
+        let known = self.logs.iter().filter(|(id, log)| log.held() > 0 && removed.contains(&id.robot));
+        Vote {
+            epoch: closing.views.epoch,
+            ballot,
+            accepted: false,
+            held: known.map(|(id, log)| (*id, log.held())).collect(),
+            removed,
+            added: Vec::new(),
+            from: self.seal_of(closing.owner).map_or(Timestamp::MIN, |seal| seal.observed),
+            operator,
         }
-        joined.removed = removed.into_iter().collect();
-        joined.added = added.into_iter().collect();
-        joined.held = held.into_iter().filter(|(log, _)| joined.removed.contains(&log.robot)).collect();
-        joined.epoch = views.epoch;
-        joined.from = from;
-        if own == Some(&joined) {
-            return None;
-        }
-        joined.from = from.max(self.seal_of(owner).map_or(Timestamp::MIN, |seal| seal.observed));
-        (own != Some(&joined)).then_some(joined)
     }
 }

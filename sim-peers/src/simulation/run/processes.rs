@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use pleiad_agent::{Event, Node, Record};
+use pleiad_agent::{Event, Node};
 use pleiad_estimation::fact::LogId;
 use pleiad_estimation::{RobotId, Timestamp};
 
@@ -75,9 +75,10 @@ impl Run<'_> {
             Ok(records) => records,
             Err(error) => return Err(self.checks.violation(Some(id), error.to_string())),
         };
+        #[allow(unused_mut, reason = "a mistake may be planted")]
+        let mut node = Node::recover(robot.config.clone(), nonce, records);
         // Who has lost his disk asks the others first; as long as not all are there who know, he waits.
-        let lived = records.iter().any(|record| matches!(record, Record::Sample(_) | Record::Tick { .. }));
-        let lost = self.now > Timestamp(0) && !lived;
+        let lost = self.now > Timestamp(0) && !node.has_lived();
         let full = robot.disk.full;
         let all = self.robots.iter().all(|(other, robot)| {
             *other == id
@@ -88,14 +89,13 @@ impl Run<'_> {
             self.after(0.5, Due::Start(id));
             return Ok(());
         }
-        let Some(robot) = self.robots.get_mut(&id) else { return Ok(()) };
-        #[allow(unused_mut, reason = "a mistake may be planted")]
-        let mut node = Node::recover(robot.config.clone(), nonce, records);
         #[cfg(feature = "planted")]
         if let Some(planted) = self.options.planted {
             node.plant(planted);
         }
-        robot.node = Some(node);
+        if let Some(robot) = self.robots.get_mut(&id) {
+            robot.node = Some(node);
+        }
         if lost {
             // What reached nobody was never said.
             let others = self.robots.iter().filter(|(other, _)| **other != id);
