@@ -23,8 +23,8 @@ use tokio::time::MissedTickBehavior;
 
 use crate::config::{AgentConfig, ConfigError, NodeConfig};
 use crate::journal::{self, Journal, JournalError};
-use crate::node::{Command, Event, Notice, Record, SettledEstimate};
-use crate::results::{self, ResultsError};
+use crate::node::{Command, Event, Notice, Record};
+use crate::results::{self, ResultsError, Trajectories};
 use crate::role::Role;
 
 /// How long a peer has to answer. For facts it is asked again at its next status.
@@ -84,7 +84,8 @@ struct Agent<'a, B: Bus> {
     publisher: Publisher<'a, B>,
     bus: &'a B,
     team: TeamName,
-    online: Vec<SettledEstimate>,
+    /// What is written of its estimates as it goes; `None` without a folder.
+    trajectories: Option<Trajectories>,
     /// The last batch and its acknowledgement: a batch sent again is answered again, and taken once.
     last_batch: Option<(Vec<u8>, SensorAck)>,
     /// Peers with an unanswered request.
@@ -93,8 +94,6 @@ struct Agent<'a, B: Bus> {
     /// Peers with an unanswered request for a snapshot.
     asked_snapshot: BTreeSet<RobotId>,
     parts: mpsc::Sender<(RobotId, Option<SnapshotPart>)>,
-    /// Settled estimates of what is closed, which the node has forgotten.
-    settled: Vec<SettledEstimate>,
     /// Size of the journal after it was replaced last.
     compacted_bytes: u64,
     misattributed: u64,
@@ -133,6 +132,8 @@ pub async fn run<B: Bus + Clone>(
     let folder = config.output.directory.clone();
     let (journal, records) = open_journal(folder.as_ref())?;
     check_records(&node_config, folder.as_ref(), &records)?;
+    let trajectories =
+        folder.as_ref().map(|folder| Trajectories::open(folder, records.is_empty())).transpose()?;
     let role = Role::recover(node_config, nonce, records);
     let fresh = role.may_have_lived();
     let (answers_in, answers) = mpsc::channel(64);
@@ -144,13 +145,12 @@ pub async fn run<B: Bus + Clone>(
         publisher: Publisher::new(bus, team.clone(), robot),
         bus,
         team,
-        online: Vec::new(),
+        trajectories,
         last_batch: None,
         asked: BTreeSet::new(),
         answers: answers_in,
         asked_snapshot: BTreeSet::new(),
         parts: parts_in,
-        settled: Vec::new(),
         compacted_bytes: 0,
         misattributed: 0,
     };
@@ -334,13 +334,17 @@ impl<B: Bus + Clone> Agent<'_, B> {
                 }
                 Command::Closed { cut, settled, .. } => {
                     tracing::debug!(cut = cut.0, "the past is closed");
-                    self.settled.extend(settled);
+                    if let Some(trajectories) = &mut self.trajectories {
+                        trajectories.closed(&settled)?;
+                    }
                     self.compact()?;
                 }
                 Command::AskSnapshot { peer, request } => self.ask_snapshot(peer, request),
                 Command::Publish(entries) => self.publisher.entries(&entries).await,
                 Command::Estimate(estimate) => {
-                    self.online.push(results::online(&estimate));
+                    if let Some(trajectories) = &mut self.trajectories {
+                        trajectories.online(&results::online(&estimate))?;
+                    }
                     self.publisher.publish(Kind::Estimate, &Message::Estimate(estimate)).await;
                 }
                 Command::Ask { peer, request } => self.ask(peer, request),
@@ -421,12 +425,10 @@ impl<B: Bus + Clone> Agent<'_, B> {
         if let Some(journal) = &mut self.journal {
             journal.sync()?;
         }
-        if let Some(folder) = &self.folder {
+        if let (Some(folder), Some(trajectories)) = (&self.folder, &self.trajectories) {
             let (messages, bytes) = self.publisher.sent();
-            let summary = self.role.summary(messages, bytes);
-            let mut settled = self.settled.clone();
-            settled.extend(self.role.settled());
-            results::write(folder, &settled, &self.online, &summary)?;
+            trajectories.finish(&self.role.settled())?;
+            results::write_summary(folder, &self.role.summary(messages, bytes))?;
         }
         Ok(())
     }

@@ -1,5 +1,7 @@
 //! What an agent leaves behind: its trajectories, online and settled, and a summary.
 
+mod trajectories;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +13,8 @@ use serde::{Deserialize, Serialize};
 use crate::approximate::Approximate;
 use crate::node::{Node, SettledEstimate};
 
+pub(crate) use trajectories::Trajectories;
+
 /// First line of the files of estimates.
 pub const COLUMNS: &str =
     "t_ns,boot,x_m,y_m,yaw_rad,xx,yx,yy,yawx,yawy,yawyaw,odom_x_m,odom_y_m,odom_yaw_rad";
@@ -19,6 +23,8 @@ pub const COLUMNS: &str =
 pub const SETTLED: &str = "settled.csv";
 /// Name of the file of online estimates.
 pub const ONLINE: &str = "online.csv";
+/// Name of the file of estimates that were settled when the past was closed.
+pub const CLOSED: &str = "closed.csv";
 /// Name of the summary.
 pub const SUMMARY: &str = "agent.json";
 
@@ -134,19 +140,11 @@ fn of(status: &Status) -> AgentSummary {
     }
 }
 
-/// Writes settled and online estimates and the summary into a folder.
+/// Writes the summary into a folder.
 ///
 /// # Errors
-/// [`ResultsError::Io`].
-pub fn write(
-    folder: &Path,
-    settled: &[SettledEstimate],
-    online: &[SettledEstimate],
-    summary: &AgentSummary,
-) -> Result<(), ResultsError> {
-    std::fs::create_dir_all(folder).map_err(|cause| ResultsError::Io { path: folder.to_owned(), cause })?;
-    write_file(&folder.join(SETTLED), &table(settled))?;
-    write_file(&folder.join(ONLINE), &table(online))?;
+/// [`ResultsError`].
+pub fn write_summary(folder: &Path, summary: &AgentSummary) -> Result<(), ResultsError> {
     let path = folder.join(SUMMARY);
     let text = serde_json::to_string_pretty(summary)
         .map_err(|cause| ResultsError::Summary { path: path.clone(), cause })?;
@@ -162,10 +160,8 @@ fn write_file(path: &Path, text: &str) -> Result<(), ResultsError> {
 }
 
 /// Numbers by their shortest exact digits, so that equal bits give equal files.
-fn table(estimates: &[SettledEstimate]) -> String {
-    let mut text = String::with_capacity(estimates.len() * 220 + 100);
-    text.push_str(COLUMNS);
-    text.push('\n');
+fn rows(estimates: &[SettledEstimate]) -> String {
+    let mut text = String::with_capacity(estimates.len() * 220);
     for estimate in estimates {
         let (p, n) = (&estimate.pose, &estimate.nominal);
         let numbers = [p.x_m(), p.y_m(), p.yaw_rad()].into_iter().chain(estimate.covariance.0).chain([
@@ -229,30 +225,4 @@ pub fn read_summary(folder: &Path) -> Result<AgentSummary, ResultsError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn estimates_read_back_to_the_same_bits() {
-        let estimate = SettledEstimate {
-            time: Timestamp(1_248_273_546_275_000_001),
-            boot: BootIndex(2),
-            pose: Pose2::new(0.1 + 0.2, -1e-17, 3.0),
-            covariance: Symmetric3([1.0 / 3.0, -0.0, 2.0, 1e-300, 5.5, 7.0]),
-            nominal: Pose2::new(-4.0, 1e10, -3.0),
-        };
-        let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), &[estimate], &[], &AgentSummary::default()).unwrap();
-        assert_eq!(read_estimates(&folder.path().join(SETTLED)).unwrap(), [estimate]);
-        assert_eq!(read_estimates(&folder.path().join(ONLINE)).unwrap(), []);
-        assert_eq!(read_summary(folder.path()).unwrap(), AgentSummary::default());
-    }
-
-    #[test]
-    fn a_damaged_line_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(SETTLED);
-        std::fs::write(&path, format!("{COLUMNS}\n1,0,1,2,3\n")).unwrap();
-        assert!(matches!(read_estimates(&path).unwrap_err(), ResultsError::Line { line: 2, .. }));
-    }
-}
+mod tests;

@@ -116,11 +116,14 @@ async fn a_robot_that_is_seen_learns_from_it_under_every_strategy_but_independen
         sigma.insert(kind.name(), (last[0] + last[2]).sqrt());
     }
     for kind in KINDS {
-        let learnt = sigma[kind.name()] < 0.99 * sigma["independent"];
+        let learnt = sigma[kind.name()] < sigma["independent"] - 1e-3;
         assert_eq!(learnt, kind != StrategyKind::Independent, "{sigma:?}");
     }
-    // A first meeting is exact for `pairwise` and `naive`; what bounds every correlation learns less.
-    assert!((sigma["pairwise"] - sigma["naive"]).abs() < 1e-6, "{sigma:?}");
+    // A first meeting, of robots that are independent still, is exact for all but the one that bounds every
+    // correlation.
+    for kind in ["naive", "split_intersection"] {
+        assert!((sigma["pairwise"] - sigma[kind]).abs() < 1e-9, "{sigma:?}");
+    }
     assert!(sigma["intersection"] > 1.01 * sigma["pairwise"], "{sigma:?}");
 }
 

@@ -4,8 +4,8 @@
 use std::f64::consts::PI;
 
 use pleiad_estimation::fact::{
-    Absolute, Answer, Ballot, Body, Boot, ClockMap, Continuation, Entry, EntryId, Fingerprint, Half, LogId, Noise,
-    NoiseRef, NominalState, Observation, Profile, Quantity, Seal, SealedLog, VoidReason, Vote,
+    Absolute, Answer, Ballot, Body, Boot, ClockMap, Continuation, Entry, EntryId, Fingerprint, Half, LogId,
+    Noise, NoiseRef, NominalState, Observation, Profile, Quantity, Seal, SealedLog, VoidReason, Vote,
 };
 use pleiad_estimation::geometry::{Matrix3, Vector3};
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};

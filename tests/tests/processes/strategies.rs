@@ -5,13 +5,8 @@ use serde_json::Value;
 
 /// The strategies, and the share of sightings that each uses in full: by both robots, by the one that was
 /// seen, by none.
-const KINDS: [(&str, u64); 5] = [
-    ("pairwise", 2),
-    ("intersection", 1),
-    ("split_intersection", 1),
-    ("naive", 1),
-    ("independent", 0),
-];
+const KINDS: [(&str, u64); 5] =
+    [("pairwise", 2), ("intersection", 1), ("split_intersection", 1), ("naive", 1), ("independent", 0)];
 
 fn number(json: &Value, table: &str, key: &str) -> u64 {
     json[table][key].as_u64().unwrap_or_else(|| panic!("{table}.{key}: {json}"))
