@@ -6,6 +6,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{LandmarkId, RobotId};
+use pleiad_sim_peers::scenario::ManoeuvreKind;
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
 #[derive(Debug, Parser)]
@@ -178,6 +179,13 @@ pub struct SimulateArgs {
     /// Seed of the scenario; its own if absent.
     #[arg(long, conflicts_with = "from")]
     pub seed: Option<u64>,
+    /// Drive these manoeuvres instead, as in straight,turn: standstill, straight, turn, turn_steps, circle, arc,
+    /// figure_eight, square, steps, ramp, weave, crawl (docs/scenario.md).
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', conflicts_with = "from")]
+    pub manoeuvre: Vec<ManoeuvreKind>,
+    /// How long, seconds; as the scenario says if absent.
+    #[arg(long, conflicts_with = "from")]
+    pub seconds: Option<f64>,
     /// The recording to predict, a folder with nominal.toml in it.
     #[arg(long, value_name = "RECORDING")]
     pub from: Option<PathBuf>,

@@ -5,6 +5,7 @@ mod declared;
 mod drive;
 mod keys;
 mod load;
+mod manoeuvre;
 mod settings;
 mod validate;
 
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 pub use declared::Declared;
 pub use drive::{DriveKind, DriveSettings};
+pub use manoeuvre::{ManoeuvreKind, UnknownManoeuvre};
 pub use settings::{
     Direction, Gps, Gyro, Heading, Motion, MotionNoise, Odometry, OdometryKind, Policy, PriorSettings,
     RelativeKind, RelativeSensor, RobotSettings, See, Start,

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::declared::Declared;
 use super::drive::DriveSettings;
+use super::manoeuvre::ManoeuvreKind;
 
 /// Everything about one robot: body, motion, prior, sensors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -133,6 +134,8 @@ pub struct Motion {
     pub area_m: Option<[f64; 4]>,
     /// What `script` commands: `[forward m/s, yaw rate rad/s, seconds]`, one after the other.
     pub script: Vec<[f64; 3]>,
+    /// Which manoeuvres are driven under `manoeuvres`; all if empty.
+    pub manoeuvres: Vec<ManoeuvreKind>,
     /// Distance wandering robots try to keep from others, metres; 0 means they do not look.
     pub keep_away_m: f64,
 }
@@ -150,6 +153,7 @@ impl Default for Motion {
             move_s: 15.0,
             area_m: None,
             script: Vec::new(),
+            manoeuvres: Vec::new(),
             keep_away_m: 0.5,
         }
     }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use pleiad_estimation::RobotId;
 
-use super::{RobotSettings, Scenario};
+use super::{DriveKind, RobotSettings, Scenario};
 use crate::Error;
 
 /// Odometry slower than this would hold the wheels for too long to steer, Hz; observations start after
@@ -137,6 +137,14 @@ impl Check {
                 let expected = "finite numbers [forward m/s, yaw rate rad/s, seconds] with seconds above 0";
                 return Err(self.invalid("motion.script", &format!("{row:?}"), expected));
             }
+        }
+        let nothing = !motion.manoeuvres.is_empty()
+            && settings.drive.kind == DriveKind::CarLike
+            && motion.manoeuvres.iter().all(|kind| kind.on_the_spot());
+        if nothing {
+            let names: Vec<_> = motion.manoeuvres.iter().map(|kind| kind.name()).collect();
+            let expected = "a manoeuvre without turning on the spot, which a car cannot do";
+            return Err(self.invalid("motion.manoeuvres", &format!("{names:?}"), expected));
         }
         self.not_negative("motion.keep_away_m", motion.keep_away_m)
     }

@@ -101,3 +101,58 @@ fn a_script_is_commanded_row_by_row_and_then_nothing() {
     }
     assert!(commands.len() >= 248);
 }
+
+#[test]
+fn only_what_was_asked_for_is_driven_between_the_ways_there() {
+    use pleiad_sim_peers::scenario::ManoeuvreKind as Kind;
+    let driven = |kinds: &[Kind]| {
+        let mut scenario = shipped("manoeuvres");
+        scenario.duration_s = 60.0;
+        for settings in scenario.robots.values_mut() {
+            settings.motion.manoeuvres = kinds.to_vec();
+        }
+        let run = simulate(&scenario, 3).unwrap();
+        let commands = run.recording.robots.values().flat_map(|own| own.commands.clone());
+        commands.collect::<Vec<Command>>()
+    };
+    // On the way to a start a robot goes at most at 0.8 of its speed.
+    let fast = |own: &&Command| own.forward_m_s.abs() > 0.65;
+    let bent = |own: &&Command| own.yaw_rate_rad_s.abs() > 1e-9;
+    let still = |own: &&Command| own.forward_m_s == 0.0 && own.yaw_rate_rad_s == 0.0;
+    let straight = driven(&[Kind::Straight]);
+    assert!(straight.iter().filter(fast).count() > 100);
+    assert_eq!(straight.iter().filter(fast).filter(bent).count(), 0);
+    let curved = driven(&[Kind::FigureEight, Kind::Circle]);
+    assert!(curved.iter().filter(fast).filter(bent).count() > 100);
+    assert_eq!(driven(&[Kind::Turn]).iter().filter(fast).count(), 0);
+    let standing = driven(&[Kind::Standstill]);
+    assert!(4 * standing.iter().filter(still).count() > standing.len());
+}
+
+#[test]
+fn every_manoeuvre_has_the_name_it_is_read_by() {
+    use pleiad_sim_peers::scenario::ManoeuvreKind;
+    let page = include_str!("../../../docs/scenario.md");
+    let row = page.lines().find(|line| line.starts_with("| `motion.manoeuvres`")).unwrap();
+    for kind in ManoeuvreKind::ALL {
+        assert_eq!(kind.name().parse(), Ok(kind));
+        assert!(row.contains(&format!("`{kind}`")), "{kind}");
+    }
+    let error = "looping".parse::<ManoeuvreKind>().unwrap_err().to_string();
+    assert!(error.contains("looping") && error.contains("figure_eight"), "{error}");
+}
+
+#[test]
+fn a_car_that_is_to_turn_on_the_spot_alone_is_refused() {
+    use pleiad_sim_peers::scenario::ManoeuvreKind as Kind;
+    let mut scenario = shipped("manoeuvres_car_like");
+    for settings in scenario.robots.values_mut() {
+        settings.motion.manoeuvres = vec![Kind::Turn, Kind::TurnSteps];
+    }
+    let error = scenario.validate().unwrap_err().to_string();
+    assert!(error.contains("motion.manoeuvres") && error.contains("turn_steps"), "{error}");
+    for settings in scenario.robots.values_mut() {
+        settings.motion.manoeuvres.push(Kind::Arc);
+    }
+    assert!(scenario.validate().is_ok());
+}

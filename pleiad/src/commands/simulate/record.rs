@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use pleiad_recording::{Overwrite, write_folder};
+use pleiad_sim_peers::scenario::Policy;
 use pleiad_sim_peers::{Scenario, SimulatedRun, injected_text, simulate};
 use serde::Serialize;
 
@@ -30,7 +31,17 @@ struct RobotJson {
 }
 
 pub(super) fn run(file: &Path, args: &SimulateArgs) -> anyhow::Result<()> {
-    let scenario = Scenario::load(file)?;
+    let mut scenario = Scenario::load(file)?;
+    if let Some(seconds) = args.seconds {
+        scenario.duration_s = seconds;
+    }
+    if !args.manoeuvre.is_empty() {
+        for settings in scenario.robots.values_mut() {
+            settings.motion.policy = Policy::Manoeuvres;
+            settings.motion.manoeuvres.clone_from(&args.manoeuvre);
+        }
+    }
+    scenario.validate()?;
     let run = simulate(&scenario, args.seed.unwrap_or(scenario.seed))?;
     if let Some(asked) = &args.out {
         beside(asked)?;

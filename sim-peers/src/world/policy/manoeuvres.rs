@@ -12,7 +12,7 @@ use super::programme::{Limits, Manoeuvre, extent, programme};
 use super::script::Script;
 use super::{Twist, View, steer};
 use crate::Scenario;
-use crate::scenario::{DriveKind, Motion};
+use crate::scenario::{DriveKind, ManoeuvreKind, Motion};
 use crate::world::placement::own_area;
 use crate::world::random::{between, uniform};
 
@@ -39,6 +39,8 @@ const CHOICES_AT_ONCE: u32 = 8;
 pub(super) struct Manoeuvres {
     area_m: [f64; 4],
     limits: Limits,
+    /// Which are driven; all if empty.
+    kinds: Vec<ManoeuvreKind>,
     /// Manoeuvres still to come before all are shuffled again.
     deck: Vec<Manoeuvre>,
     stream: ChaCha12Rng,
@@ -78,7 +80,8 @@ impl Manoeuvres {
             reach_m: 0.5 * smaller_m - margin_m,
         };
         let area_m = [x_min + margin_m, x_max - margin_m, y_min + margin_m, y_max - margin_m];
-        Self { area_m, limits, deck: Vec::new(), stream, phase: Phase::Choosing }
+        let kinds = motion.manoeuvres.clone();
+        Self { area_m, limits, kinds, deck: Vec::new(), stream, phase: Phase::Choosing }
     }
 
     pub(super) fn command(&mut self, motion: &Motion, view: &View<'_>) -> Twist {
@@ -102,7 +105,7 @@ impl Manoeuvres {
 
     fn choose(&mut self, view: &View<'_>) {
         if self.deck.is_empty() {
-            let [first, rest] = programme(&self.limits);
+            let [first, rest] = programme(&self.limits, &self.kinds);
             // Taken from the end.
             self.deck = self.shuffled(rest);
             let first = self.shuffled(first);

@@ -4,6 +4,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use pleiad_physics::Pose;
 
+use crate::scenario::ManoeuvreKind;
+
 /// A manoeuvre: rows of `[forward m/s, yaw rate rad/s, seconds]`.
 pub(super) type Manoeuvre = Vec<[f64; 3]>;
 
@@ -27,38 +29,48 @@ const PAUSE: [f64; 3] = [0.0, 0.0, PAUSE_S];
 const CRAWL_M_S: f64 = 0.06;
 const CRAWL_RAD_S: f64 = 0.1;
 
-/// Every manoeuvre once: first those that every kind of motion is in, then the rest.
-pub(super) fn programme(limits: &Limits) -> [Vec<Manoeuvre>; 2] {
+/// Every manoeuvre of these kinds once (of all, if there are none): first those that every kind of motion is
+/// in, then the rest.
+pub(super) fn programme(limits: &Limits, kinds: &[ManoeuvreKind]) -> [Vec<Manoeuvre>; 2] {
+    whole(limits).map(|part| {
+        let wanted = |(kind, manoeuvre)| (kinds.is_empty() || kinds.contains(&kind)).then_some(manoeuvre);
+        part.into_iter().filter_map(wanted).collect()
+    })
+}
+
+fn whole(limits: &Limits) -> [Vec<(ManoeuvreKind, Manoeuvre)>; 2] {
+    use ManoeuvreKind as Kind;
     let Limits { speed_m_s: fast, yaw_rate_rad_s: turn, reach_m, .. } = *limits;
     let (slow, middle) = (0.3 * fast, 0.6 * fast);
     let mut first = vec![
-        vec![[0.0, 0.0, 5.0]],
-        there_and_back(slow, 0.0, 0.6 * reach_m / slow),
-        there_and_back(middle, 0.0, 1.6 * reach_m / middle),
-        there_and_back(fast, 0.0, 1.6 * reach_m / fast),
-        stop_and_go(fast, reach_m),
-        crawl(limits),
-        eight(limits, fast),
-        square(limits, middle, 1.0),
+        (Kind::Standstill, vec![[0.0, 0.0, 5.0]]),
+        (Kind::Straight, there_and_back(slow, 0.0, 0.6 * reach_m / slow)),
+        (Kind::Straight, there_and_back(middle, 0.0, 1.6 * reach_m / middle)),
+        (Kind::Straight, there_and_back(fast, 0.0, 1.6 * reach_m / fast)),
+        (Kind::Steps, stop_and_go(fast, reach_m)),
+        (Kind::Crawl, crawl(limits)),
+        (Kind::FigureEight, eight(limits, fast)),
+        (Kind::Square, square(limits, middle, 1.0)),
     ];
     let mut rest = vec![
-        stop_and_go(-middle, reach_m),
-        ramp(fast, reach_m),
-        weave(middle, turn, reach_m),
-        eight(limits, middle),
-        eight(limits, -middle),
-        square(limits, middle, -1.0),
+        (Kind::Steps, stop_and_go(-middle, reach_m)),
+        (Kind::Ramp, ramp(fast, reach_m)),
+        (Kind::Weave, weave(middle, turn, reach_m)),
+        (Kind::FigureEight, eight(limits, middle)),
+        (Kind::FigureEight, eight(limits, -middle)),
+        (Kind::Square, square(limits, middle, -1.0)),
     ];
     for sense in [1.0, -1.0] {
-        first.push(arc(limits, middle, sense, 0.5 * reach_m));
-        rest.push(arc(limits, fast, sense, 0.9 * reach_m));
+        first.push((Kind::Arc, arc(limits, middle, sense, 0.5 * reach_m)));
+        rest.push((Kind::Arc, arc(limits, fast, sense, 0.9 * reach_m)));
         if limits.tightest_m.is_none() {
-            first.push(vec![[0.0, sense * turn, TAU / turn], PAUSE]);
-            first.push(vec![[0.0, sense * 0.4 * turn, PI / (0.4 * turn)], PAUSE]);
-            rest.push(turn_steps(sense * turn));
-            rest.push(vec![[fast, sense * turn, TAU / turn], PAUSE]);
+            first.push((Kind::Turn, vec![[0.0, sense * turn, TAU / turn], PAUSE]));
+            first.push((Kind::Turn, vec![[0.0, sense * 0.4 * turn, PI / (0.4 * turn)], PAUSE]));
+            rest.push((Kind::TurnSteps, turn_steps(sense * turn)));
+            rest.push((Kind::Circle, vec![[fast, sense * turn, TAU / turn], PAUSE]));
         } else {
-            rest.push(there_and_back(slow, sense * slow / limits.radius(0.0), 0.7 * reach_m / slow));
+            let tight = there_and_back(slow, sense * slow / limits.radius(0.0), 0.7 * reach_m / slow);
+            rest.push((Kind::Circle, tight));
         }
     }
     [first, rest]
