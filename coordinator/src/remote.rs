@@ -168,7 +168,7 @@ impl<B: Bus + Clone> Remote<B> {
     /// # Errors
     /// [`CoordinatorError::NotSettled`] after the timeout, [`CoordinatorError::NeverSettles`].
     pub async fn wait_until_settled(&self, timeout: Duration) -> Result<(), CoordinatorError> {
-        self.wait_until(timeout, |statuses| differences(statuses)).await
+        self.wait_until(timeout, differences).await
     }
 
     /// Tells all agents to end, and waits until nobody announces himself any more.

@@ -245,7 +245,7 @@ impl Rule {
                 probability("probability", *found)?;
                 within("bytes", f64::from(*bytes), 1.0..=255.0, "a number of bytes from 1 to 255")
             }
-            Fault::Cut => Ok(()),
+            Fault::Cut | Fault::CoordinatorDies => Ok(()),
             Fault::Partition { groups } => {
                 let mut seen = BTreeSet::new();
                 for robot in groups.iter().flatten() {
@@ -270,7 +270,6 @@ impl Rule {
                 }
                 Ok(())
             }
-            Fault::CoordinatorDies => Ok(()),
             Fault::Slow { messages_per_s, .. } => {
                 within("messages_per_s", *messages_per_s, 1e-6..=1e9, "messages per second from 1e-6")
             }

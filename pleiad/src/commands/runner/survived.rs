@@ -121,7 +121,7 @@ impl Evidence {
         let mut union: BTreeMap<EntryId, &Entry> = BTreeMap::new();
         for entry in self.journals.values().flatten() {
             let first = union.entry(entry.id).or_insert(entry);
-            if Fingerprint::of(*first) != Fingerprint::of(entry) {
+            if Fingerprint::of(first) != Fingerprint::of(entry) {
                 bail!("{} has two contents: {:?} and {:?}", entry.id, first.body, entry.body);
             }
         }
