@@ -94,7 +94,7 @@ fn a_team_under_random_kills_stops_partitions_full_disks_and_loss_loses_nothing_
     let within = folder.path();
     scenario(within, 80);
     // The ready plan, with everything twice as often.
-    let plan = std::fs::read_to_string(repository().join("scenarios").join("chaos.toml")).unwrap();
+    let plan = std::fs::read_to_string(repository().join("scenarios/plans/chaos.toml")).unwrap();
     let faster =
         [("60.0", "25.0"), ("= 20.0", "= 10.0"), ("= 25.0", "= 12.0"), ("for_s = 10.0", "for_s = 5.0")];
     let plan = faster.iter().fold(plan, |plan, (from, to)| plan.replace(from, to));

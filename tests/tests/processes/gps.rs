@@ -13,10 +13,10 @@ fn sigma_m(out: &Path, robot: u32, view: &str) -> BTreeMap<i64, f64> {
         |name: &str| text.lines().next().unwrap().split(',').position(|found| found == name).unwrap();
     let (xx, yy) = (column("xx"), column("yy"));
     let row = |line: &str| {
-        let values: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
-        #[allow(clippy::cast_possible_truncation, reason = "whole seconds")]
-        let second = (values[0] * 1e-9).floor() as i64;
-        (second, (values[xx] + values[yy]).sqrt())
+        let values: Vec<&str> = line.split(',').collect();
+        let variance_m2 = |column: usize| values[column].parse::<f64>().unwrap();
+        let seconds = values[0].parse::<i64>().unwrap().div_euclid(1_000_000_000);
+        (seconds, (variance_m2(xx) + variance_m2(yy)).sqrt())
     };
     text.lines().skip(1).map(row).collect()
 }

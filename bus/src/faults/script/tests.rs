@@ -41,7 +41,7 @@ fn random_faults_keep_their_distances_lengths_and_window() {
         let wait_s = rule.start_s - last_s;
         assert!((5.0..=15.0).contains(&wait_s), "{wait_s}");
         let long_s = rule.end_s - rule.start_s;
-        assert!(long_s <= 6.0 && (long_s >= 2.0 || rule.end_s > 449.9), "{long_s}");
+        assert!(long_s <= 6.0 && (long_s >= 2.0 || rule.end_s >= 450.0), "{long_s}");
         last_s = rule.end_s;
     }
     assert!(last_s <= 450.0);
