@@ -41,6 +41,14 @@ pub(super) struct Membership {
     pub transfer: Transfer,
 }
 
+impl Membership {
+    /// What was closed with words that were not accepted is not compared with anyone's.
+    pub(super) fn forget_hashes(&mut self) {
+        self.hashes.clear();
+        self.disagrees = false;
+    }
+}
+
 impl Node {
     /// What follows for seals, votes and cuts from whatever has just happened.
     pub(super) fn advance(&mut self) {
@@ -85,8 +93,7 @@ impl Node {
     fn begin_ledger_anew(&mut self) {
         self.ledger = Self::empty_ledger(&self.config);
         self.out.records.extend(self.base_record());
-        self.membership.hashes.clear();
-        self.membership.disagrees = false;
+        self.membership.forget_hashes();
     }
 
     pub(super) fn next_boot(&self) -> BootIndex {

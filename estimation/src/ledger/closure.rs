@@ -209,11 +209,18 @@ impl Ledger {
     /// Whether a seal counts: everything it speaks of is held, and nothing speaks against its author.
     fn counts_here(&self, closing: &Closing, id: EntryId, seal: &Seal) -> bool {
         let of = |boot| LogId { robot: id.robot, boot };
-        let logs = seal.logs.iter().all(|log| {
+        let mut needed = seal.logs.iter().map(|log| {
             let ends = self.logs.get(&of(log.boot)).and_then(|log| log.limit);
-            self.holds(of(log.boot), rules::needed(log.length, ends))
+            (of(log.boot), rules::needed(log.length, ends))
         });
-        logs && closing.views.relies_on(closing.owner, id)
+        // Whoever has given a robot up relies on nothing of its that it has not said it held then.
+        let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
+        let reported = |log: LogId, length: u64| {
+            let within = |vote: &Vote| vote.held.iter().any(|(of, held)| *of == log && length <= *held);
+            length == 0 || self.is_forgotten(log) || given_up.clone().all(within)
+        };
+        reported(id.log(), id.sequence.0 + 1)
+            && needed.all(|(log, length)| self.holds(log, length) && reported(log, length))
     }
 
     fn standing(&self, closing: &Closing, term: &Term) -> Standing {

@@ -211,6 +211,7 @@ impl Checks {
             .collect();
         let mut members: BTreeSet<RobotId> = (1..=self.robots).map(RobotId).collect();
         let mut ends = BTreeMap::new();
+        let mut first_boots: BTreeMap<RobotId, BootIndex> = BTreeMap::new();
         for epoch in 0.. {
             let of_epoch = || votes.iter().filter(|(_, vote)| vote.epoch == epoch);
             let decided = of_epoch().find(|(_, vote)| {
@@ -224,13 +225,15 @@ impl Checks {
             // Of a log that nobody vouches for nothing is accepted, unless a cut had accounted for it.
             let cut = self.closed_before.get(&(epoch, vote.ballot)).copied().unwrap_or(Timestamp::MIN);
             for log in self.said.keys().map(|id| id.log()).filter(|log| vote.removed.contains(&log.robot)) {
-                if self.sealed_in(log.robot, cut).is_none_or(|boot| log.boot >= boot) {
+                let of_stay = first_boots.get(&log.robot).is_none_or(|first| log.boot >= *first);
+                if of_stay && self.sealed_in(log.robot, cut).is_none_or(|boot| log.boot >= boot) {
                     ends.entry(log).or_insert(0);
                 }
             }
             ends.extend(vote.held.iter().copied());
             for (robot, boot) in &vote.added {
                 ends.retain(|log, _| log.robot != *robot || log.boot < *boot);
+                first_boots.insert(*robot, *boot);
             }
             members.retain(|robot| !vote.removed.contains(robot));
             members.extend(vote.added.iter().map(|(robot, _)| *robot));
