@@ -173,7 +173,7 @@ impl Checks {
             node.ledger().digests().map(|digest| (digest.log, digest.held)).collect();
         // Logs that a snapshot has forgotten ended where a change of the membership says, or else where an
         // accepted seal of their author does; later boots first, because their seals say it.
-        let evicted = self.evicted_at();
+        let evicted = self.evicted_at(node.ledger().views().map_or(0, |views| views.epoch));
         let mut ends: BTreeMap<LogId, u64> = BTreeMap::new();
         let logs: BTreeSet<LogId> = self.said.keys().map(|id| id.log()).collect();
         for log in logs.into_iter().rev() {
@@ -199,8 +199,10 @@ impl Checks {
     }
 
     /// How much of the logs of evicted robots those who stayed agreed on: what more than half of the members of
-    /// an epoch accepted in one ballot, or all who would stay if an operator wants it.
-    fn evicted_at(&self) -> BTreeMap<LogId, u64> {
+    /// an epoch accepted in one ballot, or all who would stay if an operator wants it. Only `epochs` that the
+    /// team knows of in the end: what one robot of two has decided, and lost with its disk before the other
+    /// heard of it, was never decided.
+    fn evicted_at(&self, epochs: u32) -> BTreeMap<LogId, u64> {
         let votes: Vec<(RobotId, &Vote)> = self
             .said
             .values()
@@ -212,7 +214,7 @@ impl Checks {
         let mut members: BTreeSet<RobotId> = (1..=self.robots).map(RobotId).collect();
         let mut ends = BTreeMap::new();
         let mut first_boots: BTreeMap<RobotId, BootIndex> = BTreeMap::new();
-        for epoch in 0.. {
+        for epoch in 0..epochs {
             let of_epoch = || votes.iter().filter(|(_, vote)| vote.epoch == epoch);
             let decided = of_epoch().find(|(_, vote)| {
                 let staying = || members.iter().filter(|robot| !vote.removed.contains(robot));
