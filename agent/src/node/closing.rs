@@ -267,7 +267,7 @@ impl Node {
             }
         }
         let members = views.active().count();
-        if !long_absent.is_empty() && rules::may_decide(members, members - long_absent.len(), false) {
+        if !wish.operator && !long_absent.is_empty() && rules::may_decide(members, members - long_absent.len(), false) {
             wish.evict.extend(long_absent);
         }
         wish
