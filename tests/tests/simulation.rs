@@ -8,7 +8,11 @@ use pleiad_sim_peers::simulation::{Options, Outcome, run};
 fn all(seeds: std::ops::Range<u64>, options: &Options) -> Vec<Outcome> {
     let one = |seed| {
         run(seed, options).unwrap_or_else(|violation| {
-            let kind = if options.partitions_only { " --partitions" } else { "" };
+            let kind = match (options.partitions_only, options.evictions) {
+                (true, _) => " --partitions",
+                (false, true) => " --evictions",
+                (false, false) => "",
+            };
             panic!(
                 "seed {seed}: {violation}\nreplay: cargo run -p pleiad-tests --features planted \
                  --example schedules -- --seeds {seed}..{}{kind}",
@@ -27,6 +31,21 @@ fn two_hundred_schedules_keep_every_invariant() {
     let outcomes = all(0..100, &Options::default());
     assert!(outcomes.iter().map(|outcome| outcome.deaths).sum::<u64>() > 50);
 }
+
+/// Seeds that have found a mistake in the rules, in the node or in the harness; `docs/ledger.md` says which.
+#[test]
+fn schedules_that_found_a_mistake_keep_every_invariant() {
+    let each =
+        |seeds: &[u64], options: &Options| seeds.iter().for_each(|seed| drop(all(*seed..seed + 1, options)));
+    each(&CRASHES, &Options::default());
+    each(&EVICTIONS, &Options { evictions: true, ..Options::default() });
+}
+
+const CRASHES: [u64; 11] = [144, 425, 673, 1049, 1665, 1998, 2259, 2375, 2669, 2684, 3897];
+const EVICTIONS: [u64; 25] = [
+    11, 94, 113, 197, 218, 245, 260, 290, 291, 303, 432, 470, 554, 676, 946, 1076, 1115, 1322, 1520, 2683,
+    4176, 4606, 5390, 5920,
+];
 
 #[test]
 fn a_seed_gives_the_same_run_twice() {

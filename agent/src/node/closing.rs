@@ -42,6 +42,14 @@ pub(super) struct Membership {
     pub transfer: Transfer,
 }
 
+impl Membership {
+    /// What was closed with words that were not accepted is not compared with anyone's.
+    pub(super) fn forget_hashes(&mut self) {
+        self.hashes.clear();
+        self.disagrees = false;
+    }
+}
+
 impl Node {
     /// What follows for seals, votes and cuts from whatever has just happened.
     pub(super) fn advance(&mut self) {
@@ -86,8 +94,7 @@ impl Node {
     fn begin_ledger_anew(&mut self) {
         self.ledger = Self::empty_ledger(&self.config);
         self.out.records.extend(self.base_record());
-        self.membership.hashes.clear();
-        self.membership.disagrees = false;
+        self.membership.forget_hashes();
     }
 
     pub(super) fn next_boot(&self) -> BootIndex {
@@ -257,7 +264,7 @@ impl Node {
             }
         }
         let members = views.active().count();
-        if !long_absent.is_empty() && rules::may_decide(members, members - long_absent.len(), false) {
+        if !wish.operator && !long_absent.is_empty() && rules::may_decide(members, members - long_absent.len(), false) {
             wish.evict.extend(long_absent);
         }
         wish

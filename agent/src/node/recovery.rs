@@ -71,6 +71,7 @@ impl Node {
             // Evicted: it had asked to be admitted, and has not forgotten it.
             self.ledger = Self::empty_ledger(&self.config);
             self.membership.joining = Some(self.next_boot());
+            self.membership.forget_hashes();
         } else {
             self.ledger.take_over(checkpoint);
             self.segments.forget_until(cut);

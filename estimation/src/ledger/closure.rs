@@ -173,7 +173,12 @@ impl Ledger {
     /// Whether a change is decided that cannot take effect here, because entries that it accepts are missing.
     pub fn lacks_accepted(&self) -> bool {
         let decided = self.closing.as_ref().and_then(|closing| closing.views.decided());
-        decided.is_some_and(|vote| vote.held.iter().any(|(log, held)| !self.holds(*log, *held)))
+        decided.is_some_and(|vote| vote.held.iter().any(|(log, held)| !self.holds_accepted(*log, *held)))
+    }
+
+    /// Whether all that is accepted of a log is held; its author may have said that it ends earlier.
+    fn holds_accepted(&self, log: LogId, held: u64) -> bool {
+        self.holds(log, rules::needed(held, self.logs.get(&log).and_then(|log| log.limit)))
     }
 
     /// The membership as far as it is known here.
@@ -209,11 +214,18 @@ impl Ledger {
     /// Whether a seal counts: everything it speaks of is held, and nothing speaks against its author.
     fn counts_here(&self, closing: &Closing, id: EntryId, seal: &Seal) -> bool {
         let of = |boot| LogId { robot: id.robot, boot };
-        let logs = seal.logs.iter().all(|log| {
+        let mut needed = seal.logs.iter().map(|log| {
             let ends = self.logs.get(&of(log.boot)).and_then(|log| log.limit);
-            self.holds(of(log.boot), rules::needed(log.length, ends))
+            (of(log.boot), rules::needed(log.length, ends))
         });
-        logs && closing.views.relies_on(closing.owner, id)
+        // Whoever has given a robot up relies on nothing of its that it has not said it held then.
+        let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
+        let reported = |log: LogId, length: u64| {
+            let within = |vote: &Vote| vote.held.iter().any(|(of, held)| *of == log && length <= *held);
+            length == 0 || self.is_forgotten(log) || given_up.clone().all(within)
+        };
+        reported(id.log(), id.sequence.0 + 1)
+            && needed.all(|(log, length)| self.holds(log, length) && reported(log, length))
     }
 
     fn standing(&self, closing: &Closing, term: &Term) -> Standing {
@@ -293,14 +305,25 @@ impl Ledger {
     pub(super) fn hear_seal(&mut self, id: EntryId, seal: &Seal) {
         let Some(closing) = &mut self.closing else { return };
         closing.seals.entry(id.robot).or_default().insert(id, seal.clone());
+        self.end_logs(id, seal);
+        self.release();
+    }
+
+    /// Ends the logs that a seal says have ended; not on the word of one who is given up.
+    fn end_logs(&mut self, id: EntryId, seal: &Seal) {
+        let Some(closing) = &self.closing else { return };
+        let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
+        let within =
+            |vote: &Vote| vote.held.iter().any(|(of, held)| *of == id.log() && id.sequence.0 < *held);
+        if !given_up.into_iter().all(within) {
+            return;
+        }
         for log in seal.logs.iter().filter(|log| log.last) {
             let id = LogId { robot: id.robot, boot: log.boot };
-            if closing.base.floors.get(&id.robot).is_some_and(|floor| id.boot < *floor) {
-                continue;
+            if !self.is_forgotten(id) {
+                self.truncated |= self.logs.entry(id).or_default().end_at(log.length);
             }
-            self.truncated |= self.logs.entry(id).or_default().end_at(log.length);
         }
-        self.release();
     }
 
     pub(super) fn hear_vote(&mut self, id: EntryId, vote: &Vote) {
@@ -314,7 +337,7 @@ impl Ledger {
         loop {
             let Some(closing) = &self.closing else { return };
             let Some(vote) = closing.views.decided() else { return };
-            if !vote.held.iter().all(|(log, held)| self.holds(*log, *held)) {
+            if !vote.held.iter().all(|(log, held)| self.holds_accepted(*log, *held)) {
                 return;
             }
             let vote = vote.clone();
@@ -325,6 +348,12 @@ impl Ledger {
             if let Some(closing) = &mut self.closing {
                 closing.views.apply(&vote, &until);
                 closing.decisions.push(Decision { vote: vote.clone(), until });
+            }
+            // Whoever was given up and stays after all is listened to again.
+            let kept = self.closing.iter().flat_map(|closing| &closing.seals);
+            let kept = kept.filter(|(robot, _)| !vote.removed.contains(robot)).flat_map(|(_, seals)| seals);
+            for (id, seal) in kept.map(|(id, seal)| (*id, seal.clone())).collect::<Vec<_>>() {
+                self.end_logs(id, &seal);
             }
             for id in gone {
                 let limit = vote.held.iter().find(|(log, _)| *log == id).map_or(0, |(_, held)| *held);

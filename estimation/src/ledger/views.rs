@@ -44,7 +44,10 @@ impl Views {
     }
 
     /// A robot's votes in this epoch, in the order in which it gave them.
-    pub(super) fn votes_of(&self, robot: RobotId) -> impl DoubleEndedIterator<Item = (EntryId, &Vote)> {
+    pub(super) fn votes_of(
+        &self,
+        robot: RobotId,
+    ) -> impl DoubleEndedIterator<Item = (EntryId, &Vote)> + Clone {
         let first = EntryId { robot, boot: BootIndex(0), sequence: Sequence(0) };
         let last = EntryId { robot, boot: BootIndex(u32::MAX), sequence: Sequence(u64::MAX) };
         self.votes.range((self.epoch, first)..=(self.epoch, last)).map(|((_, id), vote)| (*id, vote))
@@ -57,7 +60,7 @@ impl Views {
     }
 
     /// What a robot has promised in this epoch, the last ballot last.
-    pub fn promises(&self, robot: RobotId) -> impl DoubleEndedIterator<Item = &Vote> {
+    pub fn promises(&self, robot: RobotId) -> impl DoubleEndedIterator<Item = &Vote> + Clone {
         self.votes_of(robot).map(|(_, vote)| vote).filter(|vote| !vote.accepted)
     }
 
@@ -74,14 +77,6 @@ impl Views {
     /// Robots that a robot has given up in this epoch.
     pub fn given_up(&self, robot: RobotId) -> BTreeSet<RobotId> {
         self.promises(robot).flat_map(|vote| vote.removed.iter().copied()).collect()
-    }
-
-    /// Whether a robot relies on an entry of another: not if it has given that one up, and has not said that
-    /// it held the entry when it did.
-    pub fn relies_on(&self, robot: RobotId, id: EntryId) -> bool {
-        let within =
-            |vote: &Vote| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
-        self.promises(robot).all(|vote| !vote.removed.contains(&id.robot) || within(vote))
     }
 
     /// Members that a vote lets stay.

@@ -120,13 +120,21 @@ impl Ledger {
         }
         let members = views.active().count();
         let joined: BTreeSet<RobotId> = evict.union(&views.given_up(owner)).copied().collect();
-        let operator = (wish.operator && !evict.is_empty()) || under_way.is_some_and(|vote| vote.operator);
+        // An operator answers for those he has named, not for others who happen to be away.
+        let by_operators =
+            views.active().flat_map(|term| views.promises(term.robot)).filter(|vote| vote.operator);
+        let mut named: BTreeSet<RobotId> =
+            by_operators.flat_map(|vote| vote.removed.iter().copied()).collect();
+        if wish.operator {
+            named.extend(&evict);
+        }
+        let operator = |removed: &BTreeSet<RobotId>| !removed.is_empty() && removed.is_subset(&named);
         let possible = |removed: &BTreeSet<RobotId>| {
-            rules::may_decide(members, members - removed.len(), operator && !removed.is_empty())
+            rules::may_decide(members, members - removed.len(), operator(removed))
         };
         let removed = [joined, evict, BTreeSet::new()].into_iter().find(possible)?;
         let ballot = Ballot { round: latest.map_or(1, |latest| latest.round + 1), robot: owner };
-        let operator = operator && !removed.is_empty();
+        let operator = operator(&removed);
         Some(self.promise_of(closing, ballot, removed.into_iter().collect(), operator))
     }
 
