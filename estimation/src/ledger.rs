@@ -232,11 +232,18 @@ impl Ledger {
         if closing.base.floors.get(&id.robot).is_some_and(|floor| id.boot < *floor) {
             return Some(Refusal::Expired);
         }
-        if let Some(log) = self.logs.get(&id.log()) {
-            return log.limit.is_some_and(|limit| id.sequence.0 >= limit).then_some(Refusal::Expired);
+        let log = self.logs.get(&id.log());
+        if log.and_then(|log| log.limit).is_some_and(|limit| id.sequence.0 >= limit) {
+            return Some(Refusal::Expired);
         }
-        let member = closing.views.active().any(|term| term.robot == id.robot && id.boot >= term.boot);
-        (!member).then_some(Refusal::NotAMember)
+        // A log may be known by name alone, because a seal speaks of it.
+        let stays = closing.views.terms.iter().filter(|term| term.robot == id.robot && term.boot <= id.boot);
+        let accepted = match stays.max_by_key(|term| term.boot) {
+            Some(term) if term.until.is_some() => term.limits.iter().any(|(log, _)| *log == id.log()),
+            Some(_) => true,
+            None => log.is_some_and(|log| log.held() > 0),
+        };
+        (!accepted).then_some(Refusal::NotAMember)
     }
 
     /// Whether what a robot says of itself at `time`, in one of its boots, is taken: within the stay in the
@@ -314,6 +321,7 @@ impl Ledger {
     fn admit(&mut self, entry: &Entry) {
         let id = entry.id;
         match &entry.body {
+            Body::Boot(boot) if self.cut().is_some_and(|cut| boot.time <= cut) => {}
             Body::Boot(boot) => self.file(FactKey::boot(boot.time, id), &Fact::Boot(*boot)),
             Body::Profile(profile) => {
                 self.profiles.entry((id.log(), profile.index)).or_insert(profile.noise);

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_estimation::fact::{Body, Entry, EntryId, Fingerprint, LogId, Seal, SealedLog};
-use pleiad_estimation::ledger::{Ledger, Log, Wish, rules};
+use pleiad_estimation::ledger::{Ledger, Log, Views, Wish, rules};
 use pleiad_estimation::sample::{Sample, SampleRefusal};
 use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
 use pleiad_protocol::{ClosureStatus, Status};
@@ -113,7 +113,7 @@ impl Node {
 
     /// The first boot of this robot's present stay in the team.
     pub(super) fn first_of_stay(&self) -> BootIndex {
-        let mut terms = self.ledger.views().into_iter().flat_map(|views| views.active());
+        let mut terms = self.ledger.views().into_iter().flat_map(Views::active);
         terms.find(|term| term.robot == self.config.robot).map_or(BootIndex(0), |term| term.boot)
     }
 
@@ -264,7 +264,10 @@ impl Node {
             }
         }
         let members = views.active().count();
-        if !wish.operator && !long_absent.is_empty() && rules::may_decide(members, members - long_absent.len(), false) {
+        if !wish.operator
+            && !long_absent.is_empty()
+            && rules::may_decide(members, members - long_absent.len(), false)
+        {
             wish.evict.extend(long_absent);
         }
         wish

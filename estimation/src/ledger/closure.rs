@@ -417,7 +417,7 @@ fn sealed_within(closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
         |id: &EntryId| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
     let later = closing.seals.get(&robot).into_iter().flatten().filter(|(id, _)| accepted(id));
     let seals = closing.base.seals.get(&robot).map(|(id, seal)| (id, seal)).into_iter().chain(later);
-    let seal = seals.filter(|(id, _)| id.boot >= term.boot).last();
+    let seal = seals.rev().find(|(id, _)| id.boot >= term.boot);
     let until =
         seal.map_or(Timestamp::MIN, |(_, seal)| closing.closure.floor(seal.observed.min(seal.answered)));
     until.max(term.from)

@@ -29,54 +29,8 @@ impl Ledger {
         if !closing.views.is_active(closing.owner) || closing.views.decided().is_some() {
             return None;
         }
-        let vote = self.accept(closing).or_else(|| self.propose(closing, wish));
+        let vote = accept(closing).or_else(|| propose(closing, wish));
         vote.or_else(|| self.promise(closing, wish)).or_else(|| self.begin(closing, wish))
-    }
-
-    /// Follows what another has proposed in its ballot.
-    fn accept(&self, closing: &Closing) -> Option<Vote> {
-        let (views, owner) = (&closing.views, closing.owner);
-        let promised = views.ballot(owner);
-        let proposals = views.active().flat_map(|term| views.votes_of(term.robot));
-        let mut proposals = proposals.map(|(_, vote)| vote).filter(|vote| vote.accepted);
-        let fresh = |vote: &Vote| !views.votes_of(owner).any(|(_, given)| given == vote);
-        proposals
-            .find(|vote| {
-                !vote.removed.contains(&owner) && rules::may_accept(promised, vote.ballot) && fresh(vote)
-            })
-            .cloned()
-    }
-
-    /// Proposes in its own ballot, once all who would stay have promised it.
-    fn propose(&self, closing: &Closing, wish: &Wish) -> Option<Vote> {
-        let (views, owner) = (&closing.views, closing.owner);
-        let asked = views.promises(owner).next_back().filter(|vote| vote.ballot.robot == owner)?;
-        let ballot = asked.ballot;
-        if views.ballot(owner) != Some(ballot)
-            || views.votes_of(owner).any(|(_, vote)| vote.accepted && vote.ballot == ballot)
-        {
-            return None;
-        }
-        let promise = |robot| views.promises(robot).find(|vote| vote.ballot == ballot);
-        let promises: Vec<&Vote> = views.staying(asked).map(promise).collect::<Option<_>>()?;
-        let accepted = views.staying(asked).flat_map(|robot| views.votes_of(robot));
-        let accepted = accepted.map(|(_, vote)| (vote.ballot, vote)).filter(|(_, vote)| vote.accepted);
-        if let Some(bound) = rules::bound(accepted, ballot) {
-            return Some(Vote { ballot, ..bound.clone() });
-        }
-        let mut held: BTreeMap<LogId, u64> = BTreeMap::new();
-        for (log, length) in promises.iter().flat_map(|vote| &vote.held) {
-            let slot = held.entry(*log).or_insert(0);
-            *slot = (*slot).max(*length);
-        }
-        let admit = wish.admit.iter().filter(|(robot, _)| !views.is_active(**robot));
-        Some(Vote {
-            accepted: true,
-            held: held.into_iter().collect(),
-            added: admit.map(|(robot, boot)| (*robot, *boot)).collect(),
-            from: promises.iter().map(|vote| vote.from).max().unwrap_or(Timestamp::MIN),
-            ..asked.clone()
-        })
     }
 
     /// Promises the latest ballot of another, if it agrees to do without those who are to go.
@@ -152,4 +106,50 @@ impl Ledger {
             operator,
         }
     }
+}
+
+/// Follows what another has proposed in its ballot.
+fn accept(closing: &Closing) -> Option<Vote> {
+    let (views, owner) = (&closing.views, closing.owner);
+    let promised = views.ballot(owner);
+    let proposals = views.active().flat_map(|term| views.votes_of(term.robot));
+    let mut proposals = proposals.map(|(_, vote)| vote).filter(|vote| vote.accepted);
+    let fresh = |vote: &Vote| !views.votes_of(owner).any(|(_, given)| given == vote);
+    proposals
+        .find(|vote| {
+            !vote.removed.contains(&owner) && rules::may_accept(promised, vote.ballot) && fresh(vote)
+        })
+        .cloned()
+}
+
+/// Proposes in its own ballot, once all who would stay have promised it.
+fn propose(closing: &Closing, wish: &Wish) -> Option<Vote> {
+    let (views, owner) = (&closing.views, closing.owner);
+    let asked = views.promises(owner).next_back().filter(|vote| vote.ballot.robot == owner)?;
+    let ballot = asked.ballot;
+    if views.ballot(owner) != Some(ballot)
+        || views.votes_of(owner).any(|(_, vote)| vote.accepted && vote.ballot == ballot)
+    {
+        return None;
+    }
+    let promise = |robot| views.promises(robot).find(|vote| vote.ballot == ballot);
+    let promises: Vec<&Vote> = views.staying(asked).map(promise).collect::<Option<_>>()?;
+    let accepted = views.staying(asked).flat_map(|robot| views.votes_of(robot));
+    let accepted = accepted.map(|(_, vote)| (vote.ballot, vote)).filter(|(_, vote)| vote.accepted);
+    if let Some(bound) = rules::bound(accepted, ballot) {
+        return Some(Vote { ballot, ..bound.clone() });
+    }
+    let mut held: BTreeMap<LogId, u64> = BTreeMap::new();
+    for (log, length) in promises.iter().flat_map(|vote| &vote.held) {
+        let slot = held.entry(*log).or_insert(0);
+        *slot = (*slot).max(*length);
+    }
+    let admit = wish.admit.iter().filter(|(robot, _)| !views.is_active(**robot));
+    Some(Vote {
+        accepted: true,
+        held: held.into_iter().collect(),
+        added: admit.map(|(robot, boot)| (*robot, *boot)).collect(),
+        from: promises.iter().map(|vote| vote.from).max().unwrap_or(Timestamp::MIN),
+        ..asked.clone()
+    })
 }
