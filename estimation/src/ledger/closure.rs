@@ -229,6 +229,16 @@ impl Ledger {
             && needed.all(|(log, length)| self.holds(log, length) && reported(log, length))
     }
 
+    /// Whether entries that a seal rests on were lost before anyone held them all: it promises nothing then,
+    /// since its answers may be among them. Its author seals again.
+    fn is_broken(&self, id: EntryId, seal: &Seal) -> bool {
+        seal.logs.iter().any(|log| {
+            let of = LogId { robot: id.robot, boot: log.boot };
+            let ends = self.logs.get(&of).and_then(|log| log.limit);
+            !self.is_forgotten(of) && rules::needed(log.length, ends) < log.length
+        })
+    }
+
     fn standing(&self, closing: &Closing, term: &Term) -> Standing {
         let mut standing = Standing { observed: Timestamp::MIN, answered: Timestamp::MIN, from: term.from };
         let base = closing.base.seals.get(&term.robot).map(|(id, seal)| (id, seal));
@@ -239,6 +249,7 @@ impl Ledger {
         let logs = self.logs.iter().filter(|(id, log)| id.robot == term.robot && log.held() > 0);
         let life = logs.map(|(id, _)| id.boot).max().unwrap_or_default();
         let sealed = closing.seals.get(&term.robot).and_then(|seals| seals.keys().next_back());
+        let of_term = of_term.filter(|(id, seal)| !self.is_broken(**id, seal));
         let covered = |id: &EntryId| {
             id.boot >= life
                 || sealed.is_some_and(|last| last.boot >= life)

@@ -82,7 +82,15 @@ fn sealed_within(closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
     let Some(term) = closing.views.active().find(|term| term.robot == robot) else { return Timestamp::MIN };
     let accepted =
         |id: &EntryId| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
-    let later = closing.seals.get(&robot).into_iter().flatten().filter(|(id, _)| accepted(id));
+    let whole = |seal: &Seal| {
+        seal.logs.iter().all(|named| {
+            let of = LogId { robot, boot: named.boot };
+            let held = vote.held.iter().find(|(log, _)| *log == of).map(|(_, held)| *held);
+            held.is_none_or(|held| named.length <= held)
+        })
+    };
+    let later = closing.seals.get(&robot).into_iter().flatten();
+    let later = later.filter(|(id, seal)| accepted(id) && whole(seal));
     let seals = closing.base.seals.get(&robot).map(|(id, seal)| (id, seal)).into_iter().chain(later);
     let seal = seals.rev().find(|(id, _)| id.boot >= term.boot);
     let until =
