@@ -6,6 +6,7 @@ mod closing;
 mod commands;
 mod corrector;
 mod intake;
+mod joining;
 mod reckoning;
 mod recovery;
 mod segments;

@@ -5,7 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 use pleiad_estimation::RobotId;
 use pleiad_estimation::fact::Ballot;
@@ -14,7 +14,7 @@ use pleiad_estimation::ledger::rules::{bound, is_decided, may_accept, may_promis
 const ROBOTS: usize = 3;
 
 /// A change: who goes and how much of its log is accepted, or, with nobody, someone who comes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Change {
     removed: Option<u8>,
     held: u8,
@@ -22,7 +22,7 @@ struct Change {
     from: u8,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Entry {
     Seal(u8),
     Promise { ballot: (u8, u8), change: Change },
@@ -40,7 +40,7 @@ enum Rule {
     ReliesOn,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct State {
     logs: [Vec<Entry>; ROBOTS],
     /// `held[p][r]`: how many entries of `r`'s log `p` holds; of its own, all.
@@ -88,7 +88,7 @@ impl State {
     }
 
     /// What is decided in the entries that are seen.
-    fn decided<'a>(&self, view: impl Fn(usize) -> &'a [Entry]) -> Vec<Change> {
+    fn decided<'a>(view: impl Fn(usize) -> &'a [Entry]) -> Vec<Change> {
         let mut found: Vec<((u8, u8), Change, usize)> = Vec::new();
         for r in 0..ROBOTS {
             for entry in view(r) {
@@ -106,11 +106,11 @@ impl State {
 
     fn sealed(&self, p: usize, r: usize, within: u8) -> (u8, u8) {
         let entries = self.view(p, r).iter().enumerate().take(usize::from(within));
-        let seals = entries.filter_map(|(place, entry)| match entry {
+        let mut seals = entries.filter_map(|(place, entry)| match entry {
             Entry::Seal(until) => Some((*until, index(place) + 1)),
             _ => None,
         });
-        seals.last().unwrap_or((0, 0))
+        seals.next_back().unwrap_or((0, 0))
     }
 
     /// How much of `r`'s log `p` relies on.
@@ -124,7 +124,7 @@ impl State {
 
     /// What is wrong with what has been decided and closed so far.
     fn wrong(&self) -> Option<String> {
-        let decided = self.decided(|r| &self.logs[r]);
+        let decided = Self::decided(|r| &self.logs[r]);
         let change = decided.first()?;
         if decided.iter().any(|other| other != change) {
             return Some(format!("two changes are decided: {self:?}"));
@@ -158,7 +158,7 @@ impl State {
                     out.push(next);
                 }
             }
-            let known = self.decided(|by| self.view(r, by));
+            let known = Self::decided(|by| self.view(r, by));
             let (own, _) = self.sealed(r, r, u8::MAX);
             if let Some(change) = known.first() {
                 // A robot that knows seals again; the others read its entries in order.
@@ -213,11 +213,9 @@ impl State {
             let cut = seals.iter().map(|(until, _)| *until).min().unwrap();
             if cut > self.closed[r].0 {
                 let mut next = self.clone();
-                let mut rests_on = [0; ROBOTS];
-                for by in 0..ROBOTS {
-                    let reaches = |entry: &Entry| matches!(entry, Entry::Seal(until) if *until >= cut);
-                    rests_on[by] = index(self.logs[by].iter().position(reaches).unwrap()) + 1;
-                }
+                let reaches = |entry: &Entry| matches!(entry, Entry::Seal(until) if *until >= cut);
+                let rests_on =
+                    std::array::from_fn(|by| index(self.logs[by].iter().position(reaches).unwrap()) + 1);
                 next.closed[r] = (cut, rests_on);
                 out.push(next);
             }
@@ -264,7 +262,7 @@ impl State {
 
 /// Every state that can be reached, and the first thing that goes wrong.
 fn explore(rule: Rule, bounds: Bounds) -> (usize, Option<String>) {
-    let mut seen = HashSet::from([State::new()]);
+    let mut seen = BTreeSet::from([State::new()]);
     let mut open = vec![State::new()];
     let mut next = Vec::new();
     while let Some(state) = open.pop() {

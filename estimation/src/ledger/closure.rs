@@ -1,6 +1,7 @@
 //! Closing the past: which cut the seals held allow. `docs/ledger.md` has the rules.
 
 mod cut;
+mod decision;
 mod proposal;
 
 use std::collections::BTreeMap;
@@ -228,6 +229,16 @@ impl Ledger {
             && needed.all(|(log, length)| self.holds(log, length) && reported(log, length))
     }
 
+    /// Whether entries that a seal rests on were lost before anyone held them all: it promises nothing then,
+    /// since its answers may be among them. Its author seals again.
+    fn is_broken(&self, id: EntryId, seal: &Seal) -> bool {
+        seal.logs.iter().any(|log| {
+            let of = LogId { robot: id.robot, boot: log.boot };
+            let ends = self.logs.get(&of).and_then(|log| log.limit);
+            !self.is_forgotten(of) && rules::needed(log.length, ends) < log.length
+        })
+    }
+
     fn standing(&self, closing: &Closing, term: &Term) -> Standing {
         let mut standing = Standing { observed: Timestamp::MIN, answered: Timestamp::MIN, from: term.from };
         let base = closing.base.seals.get(&term.robot).map(|(id, seal)| (id, seal));
@@ -238,6 +249,7 @@ impl Ledger {
         let logs = self.logs.iter().filter(|(id, log)| id.robot == term.robot && log.held() > 0);
         let life = logs.map(|(id, _)| id.boot).max().unwrap_or_default();
         let sealed = closing.seals.get(&term.robot).and_then(|seals| seals.keys().next_back());
+        let of_term = of_term.filter(|(id, seal)| !self.is_broken(**id, seal));
         let covered = |id: &EntryId| {
             id.boot >= life
                 || sealed.is_some_and(|last| last.boot >= life)
@@ -302,75 +314,6 @@ impl Ledger {
         closing.views.active().map(|term| last(term.robot)).min().unwrap_or(Timestamp::MIN)
     }
 
-    pub(super) fn hear_seal(&mut self, id: EntryId, seal: &Seal) {
-        let Some(closing) = &mut self.closing else { return };
-        closing.seals.entry(id.robot).or_default().insert(id, seal.clone());
-        self.end_logs(id, seal);
-        self.release();
-    }
-
-    /// Ends the logs that a seal says have ended; not on the word of one who is given up.
-    fn end_logs(&mut self, id: EntryId, seal: &Seal) {
-        let Some(closing) = &self.closing else { return };
-        let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
-        let within =
-            |vote: &Vote| vote.held.iter().any(|(of, held)| *of == id.log() && id.sequence.0 < *held);
-        if !given_up.into_iter().all(within) {
-            return;
-        }
-        for log in seal.logs.iter().filter(|log| log.last) {
-            let id = LogId { robot: id.robot, boot: log.boot };
-            if !self.is_forgotten(id) {
-                self.truncated |= self.logs.entry(id).or_default().end_at(log.length);
-            }
-        }
-    }
-
-    pub(super) fn hear_vote(&mut self, id: EntryId, vote: &Vote) {
-        if let Some(closing) = &mut self.closing {
-            closing.views.hear(id, vote);
-        }
-    }
-
-    /// Puts membership changes into effect that everyone who stays has voted for.
-    pub(super) fn decide(&mut self) {
-        loop {
-            let Some(closing) = &self.closing else { return };
-            let Some(vote) = closing.views.decided() else { return };
-            if !vote.held.iter().all(|(log, held)| self.holds_accepted(*log, *held)) {
-                return;
-            }
-            let vote = vote.clone();
-            let reach = |robot: &RobotId| sealed_within(closing, *robot, &vote);
-            let until: Vec<Timestamp> = vote.removed.iter().map(reach).collect();
-            let gone: Vec<LogId> =
-                self.logs.keys().copied().filter(|log| vote.removed.contains(&log.robot)).collect();
-            if let Some(closing) = &mut self.closing {
-                closing.views.apply(&vote, &until);
-                closing.decisions.push(Decision { vote: vote.clone(), until });
-            }
-            // Whoever was given up and stays after all is listened to again.
-            let kept = self.closing.iter().flat_map(|closing| &closing.seals);
-            let kept = kept.filter(|(robot, _)| !vote.removed.contains(robot)).flat_map(|(_, seals)| seals);
-            for (id, seal) in kept.map(|(id, seal)| (*id, seal.clone())).collect::<Vec<_>>() {
-                self.end_logs(id, &seal);
-            }
-            for id in gone {
-                let limit = vote.held.iter().find(|(log, _)| *log == id).map_or(0, |(_, held)| *held);
-                if let Some(log) = self.logs.get_mut(&id) {
-                    if let Some(closing) = self.closing.as_mut().filter(|_| log.base > limit) {
-                        closing.contradicted = true;
-                    }
-                    self.truncated |= log.end_at(limit);
-                    // What nobody vouches for was never there.
-                    if limit == 0 && log.held() == 0 {
-                        self.logs.remove(&id);
-                    }
-                }
-            }
-        }
-    }
-
     /// Closes the past up to `cut`, which must be [`Ledger::closable`]. Gives the hash of the snapshot.
     pub fn close(&mut self, cut: Timestamp) -> Option<Fingerprint> {
         self.settle();
@@ -408,19 +351,6 @@ impl Ledger {
         logs.sort_by_key(|(id, _)| (from(id), *id));
         logs
     }
-}
-
-/// How far an evicted robot's promises of its present stay reach within what is accepted of its logs.
-fn sealed_within(closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
-    let Some(term) = closing.views.active().find(|term| term.robot == robot) else { return Timestamp::MIN };
-    let accepted =
-        |id: &EntryId| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
-    let later = closing.seals.get(&robot).into_iter().flatten().filter(|(id, _)| accepted(id));
-    let seals = closing.base.seals.get(&robot).map(|(id, seal)| (id, seal)).into_iter().chain(later);
-    let seal = seals.rev().find(|(id, _)| id.boot >= term.boot);
-    let until =
-        seal.map_or(Timestamp::MIN, |(_, seal)| closing.closure.floor(seal.observed.min(seal.answered)));
-    until.max(term.from)
 }
 
 fn configuration(config: &FoldConfig, closure: &Closure) -> u64 {

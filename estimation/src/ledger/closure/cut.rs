@@ -183,7 +183,7 @@ impl Ledger {
                         raise(of, length);
                     }
                 }
-                if seal.observed.min(seal.answered) >= cut {
+                if seal.observed.min(seal.answered) >= cut && !self.is_broken(*id, seal) {
                     raise(id.log(), id.sequence.0 + 1);
                     seal.logs.iter().map(said).for_each(|(of, length)| raise(of, length));
                     break;

@@ -1,0 +1,163 @@
+//! Who belongs to the team, as a node sees it: its votes, what it does when it was evicted, and how it comes
+//! back. The rules are in `docs/ledger.md`.
+
+use std::collections::BTreeSet;
+
+use pleiad_estimation::fact::{Body, Entry};
+use pleiad_estimation::ledger::{Views, Wish, rules};
+use pleiad_estimation::sample::{Sample, SampleRefusal};
+use pleiad_estimation::{BootIndex, RobotId, Timestamp};
+
+use super::{Node, Notice};
+
+/// Statuses of each member without a vote after which a ballot is given up.
+const BALLOT_STATUSES: usize = 4;
+
+impl Node {
+    /// A robot that is not of the team asks to be.
+    pub(super) fn check_membership(&mut self) {
+        let robot = self.config.robot;
+        let Some(views) = self.ledger.views() else { return };
+        if self.membership.joining.is_some() && self.ledger.is_contradicted() {
+            self.begin_ledger_anew();
+            return;
+        }
+        if views.is_active(robot) || self.membership.joining.is_some() {
+            return;
+        }
+        let boot = self.next_boot();
+        let evicted = self.boot.take().is_some() || self.segments.last().is_some();
+        self.membership.joining = Some(boot);
+        for sample in std::mem::take(&mut self.waiting) {
+            self.refuse_waiting(SampleRefusal::NotAMember { time: sample.time });
+        }
+        if evicted {
+            // What this robot has closed with its own last words is not what the others close.
+            self.begin_ledger_anew();
+            self.notice(Notice::Evicted { boot });
+        }
+    }
+
+    /// Drops what was closed with words that are not accepted; peers have what is.
+    fn begin_ledger_anew(&mut self) {
+        self.ledger = Self::empty_ledger(&self.config);
+        self.out.records.extend(self.base_record());
+        self.membership.forget_hashes();
+    }
+
+    pub(super) fn next_boot(&self) -> BootIndex {
+        self.known_boot.map_or(BootIndex(0), |known| BootIndex(known.0 + 1))
+    }
+
+    /// Whether odometry at `time` may begin a boot: as a member, in the latest epoch anyone is known to have
+    /// reached, with the boot this robot was admitted with if it had asked to be.
+    pub(super) fn may_begin(&self, time: Timestamp) -> bool {
+        let Some(views) = self.ledger.views() else { return true };
+        let wanted = self.membership.joining.unwrap_or_default();
+        let mut terms = views.active().filter(|term| term.robot == self.config.robot);
+        views.epoch >= self.membership.latest_epoch
+            && terms.any(|term| term.boot >= wanted && time > term.from)
+    }
+
+    /// The first boot of this robot's present stay in the team.
+    pub(super) fn first_of_stay(&self) -> BootIndex {
+        let mut terms = self.ledger.views().into_iter().flat_map(Views::active);
+        terms.find(|term| term.robot == self.config.robot).map_or(BootIndex(0), |term| term.boot)
+    }
+
+    /// Odometry of a robot that is not of the team: it goes on by itself, so that nothing of its motion is
+    /// unknown when it is admitted.
+    pub(super) fn reckon_alone(&mut self, sample: Sample, gap: bool) -> Result<(), SampleRefusal> {
+        if self.lived && !gap {
+            self.reckon(sample)?;
+            self.emit_estimate();
+        } else {
+            self.lived = false;
+        }
+        Ok(())
+    }
+
+    /// Admitted, having gone on alone without a gap.
+    pub(super) fn carry_on_joined(&mut self) {
+        let end = self.segments.last().map(|(_, trajectory)| trajectory.end());
+        if let Some((end, state)) = end {
+            self.begin_boot_at(Timestamp(end.0 + 1), Some(state.nominal));
+        }
+    }
+
+    pub(super) fn vote(&mut self) -> bool {
+        let Some(boot) = self.boot else { return false };
+        let Some(views) = self.ledger.views() else { return false };
+        self.membership.applicants.retain(|robot, _| !views.is_active(*robot));
+        self.membership.evict.retain(|robot| views.is_active(*robot));
+        let wish = self.wish();
+        let quiet = wish.evict.is_empty() && wish.admit.is_empty() && views.votes.is_empty();
+        if quiet || !self.knows_its_past() {
+            return false;
+        }
+        match self.ledger.proposal(&wish) {
+            Some(vote) => {
+                self.membership.quiet_statuses = 0;
+                self.say(boot, Body::Vote(vote));
+                true
+            }
+            None => false,
+        }
+    }
+
+    fn wish(&self) -> Wish {
+        let mut wish = Wish {
+            evict: self.membership.evict.clone(),
+            absent: BTreeSet::new(),
+            admit: self.membership.applicants.clone(),
+            operator: !self.membership.evict.is_empty(),
+            impatient: self.is_impatient(),
+        };
+        let (Some(limit_s), Some(views), Some((_, trajectory))) =
+            (self.config.closing.evict_after_s, self.ledger.views(), self.segments.last())
+        else {
+            return wish;
+        };
+        let mut long_absent = BTreeSet::new();
+        for term in views.active().filter(|term| term.robot != self.config.robot) {
+            let sealed = self.ledger.seal_of(term.robot).map_or(Timestamp::MIN, |seal| seal.observed);
+            let heard = sealed.max(term.from).max(self.first_odometry.unwrap_or(Timestamp::MIN));
+            let silent_s = trajectory.end().0.seconds_since(heard);
+            if silent_s > limit_s {
+                long_absent.insert(term.robot);
+            }
+            if silent_s > limit_s / 2.0 {
+                wish.absent.insert(term.robot);
+            }
+        }
+        let members = views.active().count();
+        if !wish.operator
+            && !long_absent.is_empty()
+            && rules::may_decide(members, members - long_absent.len(), false)
+        {
+            wish.evict.extend(long_absent);
+        }
+        wish
+    }
+
+    /// A vote of another: the ballot goes on.
+    pub(super) fn hear_vote(&mut self, entry: &Entry) {
+        if matches!(entry.body, Body::Vote(_)) {
+            self.membership.quiet_statuses = 0;
+        }
+    }
+
+    /// Whether a ballot has led to nothing for so long that this robot tries its own: the members one after
+    /// the other.
+    fn is_impatient(&self) -> bool {
+        let Some(views) = self.ledger.views() else { return false };
+        let rank = views.active().position(|term| term.robot == self.config.robot).unwrap_or(0);
+        self.membership.quiet_statuses > (BALLOT_STATUSES + 2 * rank) * views.active().count()
+    }
+
+    pub(super) fn evict(&mut self, robot: RobotId) {
+        if robot != self.config.robot {
+            self.membership.evict.insert(robot);
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! What seals and votes change when they are heard.
+
+use super::{Closing, Decision};
+use crate::RobotId;
+use crate::Timestamp;
+use crate::fact::{EntryId, LogId, Seal, Vote};
+use crate::ledger::Ledger;
+
+impl Ledger {
+    pub(in crate::ledger) fn hear_seal(&mut self, id: EntryId, seal: &Seal) {
+        let Some(closing) = &mut self.closing else { return };
+        closing.seals.entry(id.robot).or_default().insert(id, seal.clone());
+        self.end_logs(id, seal);
+        self.release();
+    }
+
+    /// Ends the logs that a seal says have ended; not on the word of one who is given up.
+    fn end_logs(&mut self, id: EntryId, seal: &Seal) {
+        let Some(closing) = &self.closing else { return };
+        let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
+        let within =
+            |vote: &Vote| vote.held.iter().any(|(of, held)| *of == id.log() && id.sequence.0 < *held);
+        if !given_up.into_iter().all(within) {
+            return;
+        }
+        for log in seal.logs.iter().filter(|log| log.last) {
+            let id = LogId { robot: id.robot, boot: log.boot };
+            if !self.is_forgotten(id) {
+                self.truncated |= self.logs.entry(id).or_default().end_at(log.length);
+            }
+        }
+    }
+
+    pub(in crate::ledger) fn hear_vote(&mut self, id: EntryId, vote: &Vote) {
+        if let Some(closing) = &mut self.closing {
+            closing.views.hear(id, vote);
+        }
+    }
+
+    /// Puts membership changes into effect that everyone who stays has voted for.
+    pub(in crate::ledger) fn decide(&mut self) {
+        loop {
+            let Some(closing) = &self.closing else { return };
+            let Some(vote) = closing.views.decided() else { return };
+            if !vote.held.iter().all(|(log, held)| self.holds_accepted(*log, *held)) {
+                return;
+            }
+            let vote = vote.clone();
+            let reach = |robot: &RobotId| sealed_within(closing, *robot, &vote);
+            let until: Vec<Timestamp> = vote.removed.iter().map(reach).collect();
+            let gone: Vec<LogId> =
+                self.logs.keys().copied().filter(|log| vote.removed.contains(&log.robot)).collect();
+            if let Some(closing) = &mut self.closing {
+                closing.views.apply(&vote, &until);
+                closing.decisions.push(Decision { vote: vote.clone(), until });
+            }
+            // Whoever was given up and stays after all is listened to again.
+            let kept = self.closing.iter().flat_map(|closing| &closing.seals);
+            let kept = kept.filter(|(robot, _)| !vote.removed.contains(robot)).flat_map(|(_, seals)| seals);
+            for (id, seal) in kept.map(|(id, seal)| (*id, seal.clone())).collect::<Vec<_>>() {
+                self.end_logs(id, &seal);
+            }
+            for id in gone {
+                let limit = vote.held.iter().find(|(log, _)| *log == id).map_or(0, |(_, held)| *held);
+                if let Some(log) = self.logs.get_mut(&id) {
+                    if let Some(closing) = self.closing.as_mut().filter(|_| log.base > limit) {
+                        closing.contradicted = true;
+                    }
+                    self.truncated |= log.end_at(limit);
+                    // What nobody vouches for was never there.
+                    if limit == 0 && log.held() == 0 {
+                        self.logs.remove(&id);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// How far an evicted robot's promises of its present stay reach within what is accepted of its logs.
+fn sealed_within(closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
+    let Some(term) = closing.views.active().find(|term| term.robot == robot) else { return Timestamp::MIN };
+    let accepted =
+        |id: &EntryId| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
+    let whole = |seal: &Seal| {
+        seal.logs.iter().all(|named| {
+            let of = LogId { robot, boot: named.boot };
+            let held = vote.held.iter().find(|(log, _)| *log == of).map(|(_, held)| *held);
+            held.is_none_or(|held| named.length <= held)
+        })
+    };
+    let later = closing.seals.get(&robot).into_iter().flatten();
+    let later = later.filter(|(id, seal)| accepted(id) && whole(seal));
+    let seals = closing.base.seals.get(&robot).map(|(id, seal)| (id, seal)).into_iter().chain(later);
+    let seal = seals.rev().find(|(id, _)| id.boot >= term.boot);
+    let until =
+        seal.map_or(Timestamp::MIN, |(_, seal)| closing.closure.floor(seal.observed.min(seal.answered)));
+    until.max(term.from)
+}
