@@ -1,12 +1,14 @@
 //! The command line, as clap sees it.
 
+mod values;
+
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use pleiad_estimation::strategy::StrategyKind;
-use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_sim_peers::scenario::ManoeuvreKind;
+
+pub use values::{AbsoluteArg, LandmarksArg};
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
 #[derive(Debug, Parser)]
@@ -353,54 +355,4 @@ pub enum ErrorArg {
     Invariant,
     /// Additive: the textbook filter.
     Additive,
-}
-
-/// `known`, `none`, or a list of numbers.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum LandmarksArg {
-    Known,
-    None,
-    Only(Vec<LandmarkId>),
-}
-
-impl FromStr for LandmarksArg {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "known" => Ok(Self::Known),
-            "none" => Ok(Self::None),
-            list => list
-                .split(',')
-                .map(|id| id.trim().parse().map(LandmarkId))
-                .collect::<Result<_, _>>()
-                .map(Self::Only)
-                .map_err(|_| format!("found {text:?}, expected known, none, or numbers as in 6,7")),
-        }
-    }
-}
-
-/// `ROBOT@HZ:SIGMA_M`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AbsoluteArg {
-    pub robot: RobotId,
-    pub rate_hz: f64,
-    pub sigma_m: f64,
-}
-
-impl FromStr for AbsoluteArg {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parts =
-            text.split_once('@').and_then(|(robot, rest)| rest.split_once(':').map(|(hz, m)| (robot, hz, m)));
-        let parsed = parts.and_then(|(robot, hz, sigma)| {
-            Some(Self {
-                robot: RobotId(robot.parse().ok()?),
-                rate_hz: hz.parse().ok().filter(|hz: &f64| hz.is_finite() && *hz > 0.0)?,
-                sigma_m: sigma.parse().ok().filter(|sigma: &f64| sigma.is_finite() && *sigma > 0.0)?,
-            })
-        });
-        parsed.ok_or_else(|| format!("found {text:?}, expected ROBOT@HZ:SIGMA_M as in 1@1.0:0.3"))
-    }
 }
