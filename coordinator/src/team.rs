@@ -270,6 +270,15 @@ impl<B: Bus + Clone> Team<B> {
         self.handle.treat(robot, Treatment::LimitFiles(bytes)).await
     }
 
+    /// How an agent ended for good, if it does within this time.
+    ///
+    /// # Errors
+    /// [`CoordinatorError::UnknownRobot`], [`CoordinatorError::Unsupervised`].
+    pub async fn ended(&self, robot: RobotId, within: Duration) -> Result<Option<Exit>, CoordinatorError> {
+        self.agent(robot)?;
+        self.handle.ended(robot, within).await
+    }
+
     /// Waits until all agents have ended for good; returns how.
     ///
     /// # Errors
