@@ -14,10 +14,24 @@ fn load(name: &str) -> Scenario {
 }
 
 #[test]
+fn every_plan_of_faults_loads_and_has_faults() {
+    let plans = std::fs::read_dir(folder().join("plans")).unwrap().map(|entry| entry.unwrap().path());
+    let plans: Vec<PathBuf> = plans.collect();
+    assert!(!plans.is_empty());
+    for plan in plans {
+        assert!(!pleiad_bus::FaultPlan::load(&plan).unwrap().rules.is_empty(), "{}", plan.display());
+    }
+}
+
+#[test]
 fn every_scenario_loads_and_simulates_under_its_own_name() {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder()).unwrap() {
         let path = entry.unwrap().path();
+        // Plans of faults, for any scenario.
+        if path.ends_with("plans") {
+            continue;
+        }
         let scenario = Scenario::load(&path).unwrap();
         assert_eq!(path.file_stem().unwrap().to_str().unwrap(), scenario.name);
         let run = simulate(&scenario, scenario.seed).unwrap();
