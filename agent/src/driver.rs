@@ -1,4 +1,4 @@
-//! The driver: connects a [`Node`] to a bus, a clock and a journal on disk. Everything an agent process
+//! The driver: connects a robot ([`Role`]) to a bus, a clock and a journal on disk. Everything an agent process
 //! does besides thinking is here.
 
 mod asking;
