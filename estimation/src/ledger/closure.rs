@@ -340,15 +340,15 @@ impl Ledger {
     }
 
     /// The logs in an order in which they can be taken: those of who came later after the votes that admitted
-    /// him.
+    /// him. Two may come from the same time on, so that only the order of the changes tells.
     pub(super) fn by_stay(&self) -> Vec<(LogId, &Log)> {
-        let from = |id: &LogId| {
-            let terms = self.closing.iter().flat_map(|closing| &closing.views.terms);
-            let of = terms.filter(|term| term.robot == id.robot && term.boot <= id.boot);
-            of.max_by_key(|term| term.boot).map_or(Timestamp::MIN, |term| term.from)
+        let decisions: &[Decision] = self.closing.as_ref().map_or(&[], |closing| &closing.decisions);
+        let admits = |decision: &Decision, id: &LogId| {
+            decision.vote.added.iter().any(|(robot, boot)| *robot == id.robot && *boot <= id.boot)
         };
+        let admitted = |id: &LogId| decisions.iter().rposition(|decision| admits(decision, id));
         let mut logs: Vec<(LogId, &Log)> = self.logs.iter().map(|(id, log)| (*id, log)).collect();
-        logs.sort_by_key(|(id, _)| (from(id), *id));
+        logs.sort_by_key(|(id, _)| (admitted(id), *id));
         logs
     }
 }
