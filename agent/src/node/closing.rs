@@ -88,8 +88,8 @@ impl Node {
         let (Some(boot), Some(closure)) = (self.boot, self.ledger.closure()) else { return false };
         let Some((_, trajectory)) = self.segments.last() else { return false };
         let last = self.ledger.seal_of(self.config.robot);
-        let none = (Timestamp::MIN, Timestamp::MIN);
-        let (observed, answered) = last.map_or(none, |seal| (seal.observed, seal.answered));
+        let observed = last.map_or(Timestamp::MIN, |seal| seal.observed);
+        let answered = self.ledger.answered();
         let late_s = if self.input_ended { 0.0 } else { self.config.closing.late_s };
         let mut until = closure.floor(trajectory.end().0.plus_seconds(-late_s));
         // Whoever takes part in a ballot seals nothing before the epoch is decided.
