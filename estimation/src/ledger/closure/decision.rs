@@ -52,10 +52,11 @@ impl Ledger {
                 closing.views.apply(&vote, &until);
                 closing.decisions.push(Decision { vote: vote.clone(), until });
             }
-            // Whoever was given up and stays after all is listened to again.
-            let kept = self.closing.iter().flat_map(|closing| &closing.seals);
-            let kept = kept.filter(|(robot, _)| !vote.removed.contains(robot)).flat_map(|(_, seals)| seals);
-            for (id, seal) in kept.map(|(id, seal)| (*id, seal.clone())).collect::<Vec<_>>() {
+            // Whoever was given up and stays after all is listened to again; of who goes, what is accepted.
+            let counts = |id: &EntryId| !vote.removed.contains(&id.robot) || accepts(&vote, *id);
+            let seals = self.closing.iter().flat_map(|closing| closing.seals.values()).flatten();
+            let kept = seals.filter(|(id, _)| counts(id)).map(|(id, seal)| (*id, seal.clone()));
+            for (id, seal) in kept.collect::<Vec<_>>() {
                 self.end_logs(id, &seal);
             }
             for id in gone {
