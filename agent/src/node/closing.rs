@@ -27,6 +27,8 @@ pub(super) struct Membership {
     pub applicants: BTreeMap<RobotId, BootIndex>,
     /// The last snapshots of this node.
     hashes: BTreeMap<Timestamp, Fingerprint>,
+    /// Statuses in a row in which a peer was in the epoch that this ledger has reached.
+    pub same_epoch: BTreeMap<RobotId, usize>,
     /// The latest epoch that a peer has reached.
     pub latest_epoch: u32,
     /// Statuses of peers since a vote was last heard.
@@ -185,6 +187,7 @@ impl Node {
         let peer = status.robot;
         self.membership.quiet_statuses += 1;
         self.membership.latest_epoch = self.membership.latest_epoch.max(theirs.epoch);
+        self.hear_epoch(peer, theirs.epoch);
         // Whoever has been evicted without knowing yet may have closed with its own last words.
         let epoch = self.ledger.views().map_or(0, |views| views.epoch);
         if let Some((cut, hash)) = theirs.cut
