@@ -16,6 +16,10 @@ impl Node {
     pub(super) fn begin_boot_at(&mut self, time: Timestamp, rebased: Option<Pose2>) {
         let joined = self.membership.joining.take();
         let index = self.next_boot().max(joined.unwrap_or_default()).max(self.first_of_stay());
+        if joined.is_some_and(|boot| self.first_of_stay() < boot) {
+            // Its eviction was lost with the others' disks; what it has said is asked for as after that of its own.
+            self.lived_boots.clear();
+        }
         let place = self.ledger.settle().member(self.config.robot).map(|member| member.boot);
         let continuation = self.segments.last().map(|(previous, trajectory)| {
             let (end, last) = trajectory.end();

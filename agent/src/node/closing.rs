@@ -27,6 +27,8 @@ pub(super) struct Membership {
     pub applicants: BTreeMap<RobotId, BootIndex>,
     /// The last snapshots of this node.
     hashes: BTreeMap<Timestamp, Fingerprint>,
+    /// Statuses in a row in which a peer was in the epoch that this ledger has reached.
+    pub same_epoch: BTreeMap<RobotId, usize>,
     /// The latest epoch that a peer has reached.
     pub latest_epoch: u32,
     /// Statuses of peers since a vote was last heard.
@@ -88,8 +90,8 @@ impl Node {
         let (Some(boot), Some(closure)) = (self.boot, self.ledger.closure()) else { return false };
         let Some((_, trajectory)) = self.segments.last() else { return false };
         let last = self.ledger.seal_of(self.config.robot);
-        let none = (Timestamp::MIN, Timestamp::MIN);
-        let (observed, answered) = last.map_or(none, |seal| (seal.observed, seal.answered));
+        let observed = last.map_or(Timestamp::MIN, |seal| seal.observed);
+        let answered = self.ledger.answered();
         let late_s = if self.input_ended { 0.0 } else { self.config.closing.late_s };
         let mut until = closure.floor(trajectory.end().0.plus_seconds(-late_s));
         // Whoever takes part in a ballot seals nothing before the epoch is decided.
@@ -185,6 +187,7 @@ impl Node {
         let peer = status.robot;
         self.membership.quiet_statuses += 1;
         self.membership.latest_epoch = self.membership.latest_epoch.max(theirs.epoch);
+        self.hear_epoch(peer, theirs.epoch);
         // Whoever has been evicted without knowing yet may have closed with its own last words.
         let epoch = self.ledger.views().map_or(0, |views| views.epoch);
         if let Some((cut, hash)) = theirs.cut

@@ -13,6 +13,9 @@ use super::{Node, Notice};
 /// Statuses of each member without a vote after which a ballot is given up.
 const BALLOT_STATUSES: usize = 4;
 
+/// Statuses of each other robot after which an eviction that none of them knows of is taken to be lost.
+const UNAWARE_STATUSES: usize = 5;
+
 impl Node {
     /// A robot that is not of the team asks to be.
     pub(super) fn check_membership(&mut self) {
@@ -41,6 +44,7 @@ impl Node {
     /// Drops what was closed with words that are not accepted; peers have what is.
     fn begin_ledger_anew(&mut self) {
         self.ledger = Self::empty_ledger(&self.config);
+        self.membership.same_epoch.clear();
         self.out.records.extend(self.base_record());
         self.membership.forget_hashes();
     }
@@ -55,8 +59,28 @@ impl Node {
         let Some(views) = self.ledger.views() else { return true };
         let wanted = self.membership.joining.unwrap_or_default();
         let mut terms = views.active().filter(|term| term.robot == self.config.robot);
+        if wanted > BootIndex(0) && self.eviction_is_lost() {
+            return terms.any(|term| time > term.from);
+        }
         views.epoch >= self.membership.latest_epoch
             && terms.any(|term| term.boot >= wanted && time > term.from)
+    }
+
+    pub(super) fn hear_epoch(&mut self, peer: RobotId, epoch: u32) {
+        let same = self.ledger.views().is_some_and(|views| views.epoch == epoch);
+        let heard = self.membership.same_epoch.entry(peer).or_insert(0);
+        *heard = if same { *heard + 1 } else { 0 };
+    }
+
+    /// Whether nobody knows any more that this robot was evicted: all others, and this ledger after hearing
+    /// all of theirs, are in an epoch in which it is a member. They have lost their disks. It begins then as
+    /// one that has lost its own; if someone knows after all, it is evicted once more.
+    fn eviction_is_lost(&self) -> bool {
+        let Some(views) = self.ledger.views() else { return false };
+        let unaware = |robot| self.membership.same_epoch.get(&robot).is_some_and(|n| *n > UNAWARE_STATUSES);
+        let (own, others): (Vec<RobotId>, Vec<RobotId>) =
+            views.active().map(|term| term.robot).partition(|robot| *robot == self.config.robot);
+        !own.is_empty() && !others.is_empty() && others.into_iter().all(unaware)
     }
 
     /// The first boot of this robot's present stay in the team.

@@ -4,7 +4,7 @@ mod cut;
 mod decision;
 mod proposal;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::checkpoint::Checkpoint;
 use super::counts::FactCounts;
@@ -229,27 +229,30 @@ impl Ledger {
             && needed.all(|(log, length)| self.holds(log, length) && reported(log, length))
     }
 
-    /// Whether entries that a seal rests on were lost before anyone held them all: it promises nothing then,
-    /// since its answers may be among them. Its author seals again.
-    fn is_broken(&self, id: EntryId, seal: &Seal) -> bool {
-        seal.logs.iter().any(|log| {
-            let of = LogId { robot: id.robot, boot: log.boot };
-            let ends = self.logs.get(&of).and_then(|log| log.limit);
-            !self.is_forgotten(of) && rules::needed(log.length, ends) < log.length
+    /// A robot's seals after the base that promise something. One that rests on entries lost before anyone
+    /// held them all does not, since its answers may be among them; nor do later ones, which rest on what it
+    /// has said, until its author says again how much there is.
+    fn whole_seals<'a>(
+        &'a self,
+        closing: &'a Closing,
+        robot: RobotId,
+    ) -> impl Iterator<Item = (&'a EntryId, &'a Seal)> {
+        let ends = move |log: LogId| self.logs.get(&log).and_then(|held| held.limit);
+        whole(closing.seals.get(&robot).into_iter().flatten(), move |log| {
+            if self.is_forgotten(log) { None } else { ends(log) }
         })
     }
 
     fn standing(&self, closing: &Closing, term: &Term) -> Standing {
         let mut standing = Standing { observed: Timestamp::MIN, answered: Timestamp::MIN, from: term.from };
         let base = closing.base.seals.get(&term.robot).map(|(id, seal)| (id, seal));
-        let later = closing.seals.get(&term.robot).into_iter().flatten();
+        let later = self.whole_seals(closing, term.robot);
         // A log is said to have ended once, so that a later seal rests on what earlier ones speak of.
         let of_term = base.into_iter().chain(later).filter(|(id, _)| id.boot >= term.boot);
         // Nor does it rest on an earlier life before the present one has said how much of that there is.
         let logs = self.logs.iter().filter(|(id, log)| id.robot == term.robot && log.held() > 0);
         let life = logs.map(|(id, _)| id.boot).max().unwrap_or_default();
         let sealed = closing.seals.get(&term.robot).and_then(|seals| seals.keys().next_back());
-        let of_term = of_term.filter(|(id, seal)| !self.is_broken(**id, seal));
         let covered = |id: &EntryId| {
             id.boot >= life
                 || sealed.is_some_and(|last| last.boot >= life)
@@ -263,6 +266,17 @@ impl Ledger {
         standing
     }
 
+    /// Up to when the owner has said that it has answered everything that names it, all its answers being
+    /// held here. What it has promised on answers that were lost with its disk, it promises no more.
+    pub fn answered(&self) -> Timestamp {
+        let Some(closing) = &self.closing else { return Timestamp::MIN };
+        let base = closing.base.seals.get(&closing.owner).map(|(id, seal)| (id, seal));
+        let later = self.whole_seals(closing, closing.owner);
+        let held =
+            base.into_iter().chain(later).take_while(|(id, seal)| self.counts_here(closing, **id, seal));
+        held.last().map_or(Timestamp::MIN, |(_, seal)| seal.answered)
+    }
+
     /// Up to when the owner may say that it has answered everything that names it.
     pub fn answerable(&self) -> Timestamp {
         let Some(closing) = &self.closing else { return Timestamp::MIN };
@@ -274,7 +288,7 @@ impl Ledger {
             closing.views.active().map(|term| self.standing(closing, term)).collect();
         // Looking through what is owed is worth it only if something would follow.
         let sealed = closing.closure.floor(rules::answerable(members.iter().copied(), None));
-        let answered = self.seal_of(closing.owner).map_or(Timestamp::MIN, |seal| seal.answered);
+        let answered = self.answered();
         if sealed <= answered {
             return answered;
         }
@@ -340,17 +354,36 @@ impl Ledger {
     }
 
     /// The logs in an order in which they can be taken: those of who came later after the votes that admitted
-    /// him.
+    /// him. Two may come from the same time on, so that only the order of the changes tells.
     pub(super) fn by_stay(&self) -> Vec<(LogId, &Log)> {
-        let from = |id: &LogId| {
-            let terms = self.closing.iter().flat_map(|closing| &closing.views.terms);
-            let of = terms.filter(|term| term.robot == id.robot && term.boot <= id.boot);
-            of.max_by_key(|term| term.boot).map_or(Timestamp::MIN, |term| term.from)
+        let decisions: &[Decision] = self.closing.as_ref().map_or(&[], |closing| &closing.decisions);
+        let admits = |decision: &Decision, id: &LogId| {
+            decision.vote.added.iter().any(|(robot, boot)| *robot == id.robot && *boot <= id.boot)
         };
+        let admitted = |id: &LogId| decisions.iter().rposition(|decision| admits(decision, id));
         let mut logs: Vec<(LogId, &Log)> = self.logs.iter().map(|(id, log)| (*id, log)).collect();
-        logs.sort_by_key(|(id, _)| (from(id), *id));
+        logs.sort_by_key(|(id, _)| (admitted(id), *id));
         logs
     }
+}
+
+/// Of the seals of one robot, in their order, those that rest on nothing lost; `ends` says where its logs end.
+fn whole<'a>(
+    seals: impl Iterator<Item = (&'a EntryId, &'a Seal)>,
+    ends: impl Fn(LogId) -> Option<u64>,
+) -> impl Iterator<Item = (&'a EntryId, &'a Seal)> {
+    let mut lost: BTreeSet<BootIndex> = BTreeSet::new();
+    seals.filter(move |(id, seal)| {
+        for log in &seal.logs {
+            let of = LogId { robot: id.robot, boot: log.boot };
+            if rules::needed(log.length, ends(of)) < log.length {
+                lost.insert(log.boot);
+            } else {
+                lost.remove(&log.boot);
+            }
+        }
+        lost.is_empty()
+    })
 }
 
 fn configuration(config: &FoldConfig, closure: &Closure) -> u64 {

@@ -177,7 +177,10 @@ impl Checks {
         let mut ends: BTreeMap<LogId, u64> = BTreeMap::new();
         let logs: BTreeSet<LogId> = self.said.keys().map(|id| id.log()).collect();
         for log in logs.into_iter().rev() {
-            let end = held.get(&log).or_else(|| evicted.get(&log)).or_else(|| ends.get(&log)).copied();
+            // An eviction accepts what someone held. The author may have said in what is accepted too that the
+            // log is shorter, the rest being lost, when others had not heard that.
+            let ended = evicted.get(&log).into_iter().chain(ends.get(&log)).min();
+            let end = held.get(&log).or(ended).copied();
             let Some(end) = end else { continue };
             ends.insert(log, end);
             for (_, entry) in self.said.range(first_of(log)..).map(|(_, said)| said) {

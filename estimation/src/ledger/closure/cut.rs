@@ -170,6 +170,7 @@ impl Ledger {
             if accounted.is_some_and(|(_, seal)| seal.observed.min(seal.answered) >= cut) {
                 continue;
             }
+            let whole: BTreeSet<EntryId> = self.whole_seals(closing, term.robot).map(|(id, _)| *id).collect();
             let seals = closing.seals.get(&term.robot).into_iter().flatten();
             for (id, seal) in seals.filter(|(id, _)| id.boot >= term.boot) {
                 let said = |log: &SealedLog| {
@@ -183,7 +184,7 @@ impl Ledger {
                         raise(of, length);
                     }
                 }
-                if seal.observed.min(seal.answered) >= cut && !self.is_broken(*id, seal) {
+                if seal.observed.min(seal.answered) >= cut && whole.contains(id) {
                     raise(id.log(), id.sequence.0 + 1);
                     seal.logs.iter().map(said).for_each(|(of, length)| raise(of, length));
                     break;

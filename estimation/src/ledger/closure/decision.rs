@@ -1,6 +1,6 @@
 //! What seals and votes change when they are heard.
 
-use super::{Closing, Decision};
+use super::{Closing, Decision, whole};
 use crate::RobotId;
 use crate::Timestamp;
 use crate::fact::{EntryId, LogId, Seal, Vote};
@@ -18,9 +18,7 @@ impl Ledger {
     fn end_logs(&mut self, id: EntryId, seal: &Seal) {
         let Some(closing) = &self.closing else { return };
         let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
-        let within =
-            |vote: &Vote| vote.held.iter().any(|(of, held)| *of == id.log() && id.sequence.0 < *held);
-        if !given_up.into_iter().all(within) {
+        if !given_up.into_iter().all(|vote| accepts(vote, id)) {
             return;
         }
         for log in seal.logs.iter().filter(|log| log.last) {
@@ -54,10 +52,11 @@ impl Ledger {
                 closing.views.apply(&vote, &until);
                 closing.decisions.push(Decision { vote: vote.clone(), until });
             }
-            // Whoever was given up and stays after all is listened to again.
-            let kept = self.closing.iter().flat_map(|closing| &closing.seals);
-            let kept = kept.filter(|(robot, _)| !vote.removed.contains(robot)).flat_map(|(_, seals)| seals);
-            for (id, seal) in kept.map(|(id, seal)| (*id, seal.clone())).collect::<Vec<_>>() {
+            // Whoever was given up and stays after all is listened to again; of who goes, what is accepted.
+            let counts = |id: &EntryId| !vote.removed.contains(&id.robot) || accepts(&vote, *id);
+            let seals = self.closing.iter().flat_map(|closing| closing.seals.values()).flatten();
+            let kept = seals.filter(|(id, _)| counts(id)).map(|(id, seal)| (*id, seal.clone()));
+            for (id, seal) in kept.collect::<Vec<_>>() {
                 self.end_logs(id, &seal);
             }
             for id in gone {
@@ -77,20 +76,17 @@ impl Ledger {
     }
 }
 
+/// Whether an entry is within what a vote says is held of its log.
+fn accepts(vote: &Vote, id: EntryId) -> bool {
+    vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held)
+}
+
 /// How far an evicted robot's promises of its present stay reach within what is accepted of its logs.
 fn sealed_within(closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
     let Some(term) = closing.views.active().find(|term| term.robot == robot) else { return Timestamp::MIN };
-    let accepted =
-        |id: &EntryId| vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held);
-    let whole = |seal: &Seal| {
-        seal.logs.iter().all(|named| {
-            let of = LogId { robot, boot: named.boot };
-            let held = vote.held.iter().find(|(log, _)| *log == of).map(|(_, held)| *held);
-            held.is_none_or(|held| named.length <= held)
-        })
-    };
-    let later = closing.seals.get(&robot).into_iter().flatten();
-    let later = later.filter(|(id, seal)| accepted(id) && whole(seal));
+    let ends = |log: LogId| vote.held.iter().find(|(of, _)| *of == log).map(|(_, held)| *held);
+    let seals = closing.seals.get(&robot).into_iter().flatten().filter(|(id, _)| accepts(vote, **id));
+    let later: Vec<(&EntryId, &Seal)> = whole(seals, ends).collect();
     let seals = closing.base.seals.get(&robot).map(|(id, seal)| (id, seal)).into_iter().chain(later);
     let seal = seals.rev().find(|(id, _)| id.boot >= term.boot);
     let until =
