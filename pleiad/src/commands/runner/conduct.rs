@@ -79,7 +79,9 @@ impl Conduct<'_> {
                     agents.restart(robot).await?;
                 }
             }
-            agents.wait_until_alive(ALIVE_WITHIN).await?;
+            // By their answers: the liveliness of one that stood still can stay unseen after it is back.
+            let all = Remote::new(self.bus.clone(), self.config.team()?, self.config.robots());
+            all.wait_until_up(ALIVE_WITHIN).await?;
             // Nobody else tells those who were away when the samples ended.
             for (robot, told) in agents.finish().await {
                 told.with_context(|| format!("robot {robot} was told that its samples have ended"))?;
