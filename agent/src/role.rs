@@ -21,14 +21,9 @@ pub enum Role {
 impl Role {
     /// The robot that a journal tells of, of the strategy in its configuration; `nonce` as for [`Node::new`].
     pub fn recover(config: NodeConfig, nonce: u64, records: Vec<Record>) -> Self {
-        let kind = config.strategy;
-        // Records are taken by one of the two alone.
-        if kind == pleiad_estimation::strategy::StrategyKind::Exact {
-            return Self::Exact(Box::new(Node::recover(config, nonce, records)));
-        }
-        match Approximate::recover(kind, config.clone(), records) {
+        match Approximate::recover(config.strategy, config.clone(), records.iter().cloned()) {
             Some(approximate) => Self::Approximate(Box::new(approximate)),
-            None => Self::Exact(Box::new(Node::new(config, nonce))),
+            None => Self::Exact(Box::new(Node::recover(config, nonce, records))),
         }
     }
 

@@ -94,7 +94,7 @@ impl fmt::Display for Difference {
             Self::Configuration { robot, found, other, expected } => write!(
                 f,
                 "robot {robot} has configuration {found:016x}, robot {other} {expected:016x}: give both the \
-                 same [filter]"
+                 same strategy and [filter]"
             ),
             Self::InputOpen { robot } => write!(f, "robot {robot} still expects sensor input"),
             Self::NotDrained { robot, pending } => {
