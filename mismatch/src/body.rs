@@ -40,6 +40,11 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
+    /// The stamps of the reference poses at its ends, seconds.
+    pub(crate) fn stamps_s(&self) -> [f64; 2] {
+        self.stamps_s
+    }
+
     /// What the model expects the reference system to see. The state goes from window to window.
     pub(crate) fn predicted<S: Scalar>(
         &self,
@@ -105,10 +110,10 @@ fn moved_push<S: Scalar>(model: &RobotModel<S>, onset_s: f64) -> RobotModel<S> {
 }
 
 pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Motion> {
-    plan_of_length(evidence, robot, WINDOW_S)
+    plan_of_length(evidence, robot, if evidence.is_by_reference() { 0.0 } else { WINDOW_S })
 }
 
-/// Windows of any length between encoder samples.
+/// Windows of any length between encoder samples; of none, from each reference pose to the next.
 pub(crate) fn plan_of_length(evidence: &Evidence<'_>, robot: RobotId, length_s: f64) -> Plan<Motion> {
     let Some((_, track)) = evidence.robot(robot) else {
         return Plan::without(Omission::NotRecorded("robot"));
@@ -116,7 +121,11 @@ pub(crate) fn plan_of_length(evidence: &Evidence<'_>, robot: RobotId, length_s: 
     if let Some(omission) = track.wheels_missing().or_else(|| track.truth_missing()) {
         return Plan::without(omission);
     }
-    let (found, interrupted) = windows(&track.encoders, |sample| sample.time_s, length_s, track.pause_s);
+    let (found, interrupted) = if length_s > 0.0 {
+        windows(&track.encoders, |sample| sample.time_s, length_s, track.pause_s)
+    } else {
+        between_references(track)
+    };
     let mut plan = Plan::new();
     plan.count_many(interrupted, |count| Omission::NoWheels(robot, count));
     // After a window that was not rolled out the state of the body is unknown.
@@ -143,6 +152,27 @@ pub(crate) fn plan_of_length(evidence: &Evidence<'_>, robot: RobotId, length_s: 
         joined = Some(window.last);
     }
     plan
+}
+
+/// From each reference pose that has the stamp of an encoder sample to the next, and how many were given up because a
+/// pause interrupts them.
+fn between_references(track: &Track) -> (Vec<Window>, usize) {
+    let (mut found, mut interrupted) = (Vec::new(), 0);
+    let mut before: Option<usize> = None;
+    for (stamp_s, _) in &track.truth {
+        let sample = track.encoders.partition_point(|sample| sample.time_s < *stamp_s);
+        let Some(last) = (sample < track.encoders.len()).then_some(sample) else { continue };
+        if let Some(first) = before.filter(|first| *first < last) {
+            let steps = track.encoders[first..=last].windows(2);
+            if steps.into_iter().any(|pair| pair[1].time_s - pair[0].time_s > track.pause_s) {
+                interrupted += 1;
+            } else {
+                found.push(Window { first, last });
+            }
+        }
+        before = Some(last);
+    }
+    (found, interrupted)
 }
 
 /// Change of the true pose over a window minus the roll-out of the encoders.

@@ -20,6 +20,8 @@ use crate::windows::windows;
 pub(crate) const WINDOW_S: f64 = 1.0;
 /// A longer step between truth samples interrupts a window, seconds.
 const TRUTH_GAP_S: f64 = 0.2;
+/// The same where references take the place of truth, which are as far apart as what the filter was told.
+const REFERENCE_GAP_S: f64 = 2.0;
 /// After a gap of the commands the servo's state is unknown for so long, seconds.
 const UNKNOWN_S: f64 = 1.0;
 
@@ -52,7 +54,8 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId, length_s: f64) -> Pl
         let begin = track.truth.partition_point(|(stamp_s, _)| *stamp_s < from_s);
         let end = track.truth.partition_point(|(stamp_s, _)| *stamp_s <= to_s).max(begin);
         let truth = &track.truth[begin..end];
-        let (found, interrupted) = windows(truth, |(stamp_s, _)| *stamp_s, length_s, TRUTH_GAP_S);
+        let gap_s = if evidence.is_by_reference() { REFERENCE_GAP_S } else { TRUTH_GAP_S };
+        let (found, interrupted) = windows(truth, |(stamp_s, _)| *stamp_s, length_s, gap_s);
         plan.count_many(interrupted, |count| Omission::NoTruth(robot, count));
         for window in found {
             let ((from_s, start), (to_s, end)) = (truth[window.first], truth[window.last]);

@@ -39,6 +39,8 @@ pub struct DiagnoseOptions {
     pub test_on: Vec<String>,
     /// How ground truth is used.
     pub truth: TruthUse,
+    /// Whether sightings of landmarks are left out.
+    pub without_landmarks: bool,
 }
 
 /// Compares, locates, names, models.

@@ -36,7 +36,14 @@ pub enum MismatchError {
         /// The names there are.
         given: Vec<String>,
     },
-    /// Diagnosis without ground truth is not there.
-    #[error("diagnosis without ground truth is not built yet: use truth where it was recorded")]
-    WithoutTruth,
+    /// Nobody knows where a robot began.
+    #[error(
+        "without ground truth recording `{recording}` must say where robot {robot} began and how it drove: give it one true pose in truth.csv, and odometry or commands around it"
+    )]
+    NoStart {
+        /// The recording.
+        recording: String,
+        /// The robot.
+        robot: RobotId,
+    },
 }

@@ -19,6 +19,8 @@ pub struct Evidence<'a> {
     pub(crate) tracks: BTreeMap<RobotId, Track>,
     plans: BTreeMap<RobotId, Plans>,
     origin: Timestamp,
+    /// Whether truth is what a filter of the team says, and not what was recorded.
+    by_reference: bool,
 }
 
 /// What there is to compare of one robot.
@@ -46,6 +48,22 @@ impl<'a> Evidence<'a> {
     /// Prepares the robots that have a model. The models' geometry carries truth from its own stamps to
     /// those of the other channels.
     pub fn new(recording: &'a Recording, models: &BTreeMap<RobotId, RobotModel<f64>>) -> Self {
+        Self::prepared_by(recording, models, false)
+    }
+
+    /// The same of a recording whose truth is what a filter of the team says.
+    pub(crate) fn by_reference(
+        recording: &'a Recording,
+        models: &BTreeMap<RobotId, RobotModel<f64>>,
+    ) -> Self {
+        Self::prepared_by(recording, models, true)
+    }
+
+    fn prepared_by(
+        recording: &'a Recording,
+        models: &BTreeMap<RobotId, RobotModel<f64>>,
+        by_reference: bool,
+    ) -> Self {
         let origin = origin(recording);
         let track = |(&robot, model): (&RobotId, &RobotModel<f64>)| {
             Some((robot, Track::new(recording.robots.get(&robot)?, model, origin)))
@@ -56,7 +74,7 @@ impl<'a> Evidence<'a> {
         for (track, partner_m) in tracks.values_mut().zip(partners) {
             track.partner_m = partner_m;
         }
-        let mut evidence = Self { recording, tracks, plans: BTreeMap::new(), origin };
+        let mut evidence = Self { recording, tracks, plans: BTreeMap::new(), origin, by_reference };
         let plans = parallel::map(&robots, |&robot| evidence.plans_of(robot));
         evidence.plans = robots.into_iter().zip(plans).collect();
         evidence
@@ -66,7 +84,11 @@ impl<'a> Evidence<'a> {
         Plans {
             actuator: actuator::plan(self, robot),
             body: body::plan(self, robot),
-            commanded: commanded::plan(self, robot, commanded::WINDOW_S),
+            commanded: commanded::plan(
+                self,
+                robot,
+                if self.by_reference { 0.0 } else { commanded::WINDOW_S },
+            ),
             gyro: gyro::plan(self, robot),
             gps: sensors::gps_plan(self, robot),
             heading: sensors::heading_plan(self, robot),
@@ -78,6 +100,11 @@ impl<'a> Evidence<'a> {
     /// or the whole second in which the recording begins if its stamps are of another epoch (Unix time).
     pub fn origin(&self) -> Timestamp {
         self.origin
+    }
+
+    /// Whether truth is what a filter of the team says.
+    pub(crate) fn is_by_reference(&self) -> bool {
+        self.by_reference
     }
 
     pub(crate) fn seconds(&self, time: Timestamp) -> f64 {
@@ -132,7 +159,7 @@ fn squared_distance([x, y]: [f64; 2], [own_x, own_y]: [f64; 2]) -> f64 {
     (x - own_x).powi(2) + (y - own_y).powi(2)
 }
 
-fn origin(recording: &Recording) -> Timestamp {
+pub(crate) fn origin(recording: &Recording) -> Timestamp {
     let firsts = recording.robots.values().flat_map(|own| {
         let channels = [&own.odometry, &own.gyro, &own.gps, &own.heading, &own.sightings];
         let samples = channels.into_iter().filter_map(|channel| channel.first().map(|sample| sample.time));

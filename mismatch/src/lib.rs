@@ -25,6 +25,7 @@ mod model;
 mod parallel;
 mod plan;
 mod reckoning;
+mod reference;
 mod residual;
 mod rollout;
 mod schedule;

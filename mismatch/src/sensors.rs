@@ -13,13 +13,13 @@ use crate::track::{Track, motion};
 
 /// A reading of position.
 pub(crate) struct Fix {
-    at: At,
+    pub(crate) at: At,
     measured_m: [f64; 2],
 }
 
 /// A reading of heading.
 pub(crate) struct Heading {
-    at: At,
+    pub(crate) at: At,
     measured_rad: f64,
 }
 
@@ -47,6 +47,11 @@ impl At {
         let on_path = track.path().motion_at(reference.0).zip(track.path().motion_at(time_s));
         let on_path = on_path.map(|(first, last)| [first, last]);
         Some(Self { time_s, motion: motion(&regime, pose), surroundings, regime, pose, reference, on_path })
+    }
+
+    /// The stamp of the reference pose that the pose was carried from, seconds.
+    pub(crate) fn stamp_s(&self) -> f64 {
+        self.reference.0
     }
 
     /// The instant alone: velocities are taken for constant.

@@ -1,6 +1,6 @@
 //! Ranges and bearings against their prediction from the true poses.
 
-use pleiad_estimation::sample::{Reading, Relative, Target};
+use pleiad_estimation::sample::{Reading, Target};
 use pleiad_estimation::{LandmarkId, RobotId};
 use pleiad_physics::chain::sensors::{self as chain, Seen};
 use pleiad_physics::predict::{self, Instant, Path};
@@ -9,6 +9,7 @@ use pleiad_physics::{Context, Effect, Pose, RobotModel, Scalar, signal};
 use crate::channel::Channel;
 use crate::evidence::Evidence;
 use crate::plan::Plan;
+use crate::reference::range_and_bearing;
 use crate::residual::{ChannelResiduals, Omission, Residual};
 use crate::sensors::At;
 use crate::track::Track;
@@ -213,16 +214,5 @@ pub(crate) fn actual<S: Scalar>(model: &RobotModel<S>, instant: &Instant, named:
     match chain::identity(model, &context, target, &[]) {
         signal::Target::Landmark(landmark) => Target::Landmark(LandmarkId(landmark)),
         signal::Target::Robot(robot) => Target::Robot(RobotId(robot)),
-    }
-}
-
-fn range_and_bearing(relative: &Relative) -> (Option<f64>, Option<f64>) {
-    let of_point = |x: f64, y: f64| (Some(x.hypot(y)), Some(Scalar::atan2(y, x)));
-    match *relative {
-        Relative::Pose(pose) => of_point(pose.x_m(), pose.y_m()),
-        Relative::Position { x_m, y_m } => of_point(x_m, y_m),
-        Relative::Range { range_m } => (Some(range_m), None),
-        Relative::Bearing { bearing_rad } => (None, Some(bearing_rad)),
-        Relative::RangeBearing { range_m, bearing_rad } => (Some(range_m), Some(bearing_rad)),
     }
 }

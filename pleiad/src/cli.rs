@@ -210,9 +210,13 @@ pub struct DiagnoseArgs {
     /// What the nominal simulation believes, instead of the recordings' own nominal.toml.
     #[arg(long, value_name = "NOMINAL.TOML")]
     pub model: Option<PathBuf>,
-    /// Whether ground truth is used.
+    /// Whether ground truth is used. Without it robots are where the whole team measured them, and one true pose per
+    /// robot says where it began.
     #[arg(long, value_enum, default_value_t = TruthArg::Auto)]
     pub truth: TruthArg,
+    /// Leave out sightings of landmarks.
+    #[arg(long)]
+    pub without_landmarks: bool,
     /// Recordings to fit on, by the names of their folders, as in a,b. Default: those that are not tested on.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub fit_on: Vec<String>,

@@ -156,7 +156,6 @@ fn what_is_not_there_or_cannot_be_written_is_named() {
 }
 
 #[test]
-fn diagnosis_without_truth_is_refused_as_not_built_yet() {
-    refused(&["a", "--truth", "no"], &["--truth no", "not built yet"]);
+fn whether_truth_is_used_is_yes_or_no() {
     refused(&["a", "--truth", "maybe"], &["--truth", "maybe", "auto"]);
 }

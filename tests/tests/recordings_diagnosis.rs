@@ -14,7 +14,9 @@ use std::path::{Path, PathBuf};
 
 use pleiad_estimation::sample::Reading;
 use pleiad_estimation::{Pose2, RobotId};
-use pleiad_mismatch::{DiagnoseOptions, Diagnosis, Evidence, Finding, Verdict, diagnose, models, rollouts};
+use pleiad_mismatch::{
+    DiagnoseOptions, Diagnosis, Evidence, Finding, TruthUse, Verdict, diagnose, models, rollouts,
+};
 use pleiad_recording::{ReadOptions, Recording, open};
 
 /// The robot whose wheels are unequal, and whose declared track hides it.
@@ -30,6 +32,12 @@ fn read(folder: &Path) -> Recording {
     open(folder, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}")).0
 }
 
+fn without_truth(name: &str, without_landmarks: bool) -> Vec<Finding> {
+    let options = DiagnoseOptions { truth: TruthUse::No, without_landmarks, ..DiagnoseOptions::default() };
+    let diagnosis = diagnose(&[read(&folder(name))], &options);
+    diagnosis.unwrap_or_else(|error| panic!("{error}")).findings.findings
+}
+
 fn diagnosed(recording: Recording) -> Diagnosis {
     diagnose(&[recording], &DiagnoseOptions::default()).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -41,8 +49,14 @@ type Injected = (&'static str, &'static [u32], &'static [(&'static str, f64, f64
 /// Checks that these are the findings, each named alone, and nothing else.
 fn check(name: &str, injected: &[Injected]) {
     let findings = diagnosed(read(&folder(name))).findings;
+    check_among(name, &findings.findings, injected);
+    let verdict = if injected.is_empty() { Verdict::NothingMissing } else { Verdict::Named };
+    assert_eq!(findings.verdict, verdict, "{name}");
+}
+
+fn check_among(name: &str, findings: &[Finding], injected: &[Injected]) {
     let mut wrong = Vec::new();
-    let mut extra: Vec<&Finding> = findings.findings.iter().collect();
+    let mut extra: Vec<&Finding> = findings.iter().collect();
     for (effect, robots, parameters) in injected {
         let fits = |own: &&Finding| own.effect.as_deref() == Some(*effect) && own.robots == *robots;
         let Some(position) = extra.iter().position(fits) else {
@@ -62,8 +76,6 @@ fn check(name: &str, injected: &[Injected]) {
     }
     wrong.extend(extra.iter().map(|own| format!("besides {:?} on {:?}", own.effect, own.robots)));
     assert_eq!(wrong, Vec::<String>::new(), "{name}");
-    let verdict = if injected.is_empty() { Verdict::NothingMissing } else { Verdict::Named };
-    assert_eq!(findings.verdict, verdict, "{name}");
 }
 
 #[test]
@@ -107,20 +119,40 @@ fn a_limit_met_in_seven_percent_of_the_time_is_named() {
     check("p06_rare", &[("speed_saturation", &[1], &[("wheel_speed_max_rad_s", 12.0, 0.03)])]);
 }
 
+const MULTI: [Injected; 3] = [
+    ("track_width_error", &[1], &[("relative", 0.03, 0.003)]),
+    ("command_delay", &[2], &[("delay_s", 0.12, 0.001)]),
+    ("gps_lever_arm", &[3], &[("offset_body_m.forward", 0.22, 0.008), ("offset_body_m.left", -0.1, 0.008)]),
+];
+
 #[test]
 fn three_effects_on_three_robots_are_named() {
-    check(
-        "p07_multi",
-        &[
-            ("track_width_error", &[1], &[("relative", 0.03, 0.003)]),
-            ("command_delay", &[2], &[("delay_s", 0.12, 0.001)]),
-            (
-                "gps_lever_arm",
-                &[3],
-                &[("offset_body_m.forward", 0.22, 0.008), ("offset_body_m.left", -0.1, 0.008)],
-            ),
-        ],
-    );
+    check("p07_multi", &MULTI);
+}
+
+#[test]
+fn the_team_alone_shows_the_same_as_truth() {
+    check_among("p01_clean", &without_truth("p01_clean", false), &[]);
+    check_among("p04_masked", &without_truth("p04_masked", false), &UNEQUAL);
+    check_among("p07_multi", &without_truth("p07_multi", false), &MULTI);
+}
+
+#[test]
+fn robots_measured_only_by_each_other_show_it_too() {
+    check_among("p01_clean", &without_truth("p01_clean", true), &[]);
+    check_among("p07_multi", &without_truth("p07_multi", true), &MULTI);
+}
+
+#[test]
+fn without_truth_a_turned_sensor_is_a_robot_that_drives_askew() {
+    let findings = without_truth("p03_blind", false);
+    let [own] = &findings[..] else { panic!("{findings:?}") };
+    assert_eq!((own.verdict, &own.robots[..]), (Verdict::CannotTell, &[2][..]));
+    let mut set: Vec<&str> = own.support_set.iter().map(String::as_str).collect();
+    set.sort_unstable();
+    assert_eq!(set, ["crab", "sensor_yaw_misalignment"]);
+    let angle = own.parameters.values().next().map_or(0.0, |estimate| estimate.value.abs());
+    assert!((angle - 0.045).abs() < 0.003, "{angle}");
 }
 
 #[test]

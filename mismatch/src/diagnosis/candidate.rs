@@ -161,11 +161,10 @@ fn largest(effect: Effect, own: &[usize], units: &[&Unit<'_>], states: &[State])
     let mut sizes: Vec<(f64, f64)> = Vec::new();
     for &unit in own {
         let (unit, state) = (units[unit], &states[unit]);
-        for stretch in unit.stretches.iter().filter(|stretch| touches(effect, stretch.channel)) {
-            sizes.extend(stretch.range().map(|index| {
-                let z = state.residuals[index] / state.noise.sigma[index];
-                (z.abs(), unit.rows[index].time_s)
-            }));
+        let errors = state.noise.whitened(unit, &state.residuals);
+        let shows = |stretch: &&Stretch| unit.mesh.is_some() || touches(effect, stretch.channel);
+        for stretch in unit.stretches.iter().filter(shows) {
+            sizes.extend(stretch.range().map(|index| (errors[index].abs(), unit.rows[index].time_s)));
         }
     }
     sizes.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.total_cmp(&b.1)));
@@ -183,7 +182,7 @@ fn largest(effect: Effect, own: &[usize], units: &[&Unit<'_>], states: &[State])
 
 fn acts(whose: Whose, unit: &Unit<'_>) -> bool {
     match whose {
-        Whose::Robot(robot) => robot == unit.robot,
+        Whose::Robot(robot) => unit.members.iter().any(|member| member.robot == robot),
         Whose::Everyone => true,
     }
 }

@@ -28,17 +28,17 @@ const FEW: usize = 20;
 
 /// For how long a robot can be compared in these units together, seconds.
 pub(crate) fn lasting_s(units: &[&Unit<'_>], robot: RobotId) -> f64 {
-    units.iter().filter(|unit| unit.robot == robot).map(|unit| unit.span_s.1 - unit.span_s.0).sum()
+    units.iter().filter(|unit| unit.robot() == robot).map(|unit| unit.span_s.1 - unit.span_s.0).sum()
 }
 
 /// Sorts the catalogue into what the units allow and what they do not.
 pub(crate) fn entries(units: &[&Unit<'_>]) -> Entries {
     let obstacle = |effect: Effect, unit: &Unit<'_>| {
-        let lasting_s = lasting_s(units, unit.robot);
+        let lasting_s = lasting_s(units, unit.robot());
         let short = || format!("{lasting_s:.1} s can be compared, {SHORT_S} s are needed");
         obstacle(effect, unit).or_else(|| (lasting_s < SHORT_S).then(short))
     };
-    let robots: BTreeSet<_> = units.iter().map(|unit| unit.robot).collect();
+    let robots: BTreeSet<_> = units.iter().map(|unit| unit.robot()).collect();
     let mut sorted = Entries { entries: Vec::new(), untestable: Vec::new() };
     for &effect in Effect::ALL {
         let info = effect.info();
@@ -57,7 +57,7 @@ pub(crate) fn entries(units: &[&Unit<'_>]) -> Entries {
             continue;
         }
         for &robot in &robots {
-            let mut own = units.iter().filter(|unit| unit.robot == robot);
+            let mut own = units.iter().filter(|unit| unit.robot() == robot);
             let first = own.clone().next();
             if own.any(|unit| obstacle(effect, unit).is_none()) {
                 sorted.entries.push((effect, Whose::Robot(robot)));
@@ -86,9 +86,12 @@ pub(crate) fn is_shared(info: &EffectInfo) -> bool {
 /// Why an effect cannot be tested on a unit.
 fn obstacle(effect: Effect, unit: &Unit<'_>) -> Option<String> {
     let info = effect.info();
-    let steered = unit.evidence.robot(unit.robot).is_some_and(|(own, _)| !own.steer.is_empty());
+    let steered = unit.evidence.robot(unit.robot()).is_some_and(|(own, _)| !own.steer.is_empty());
     if info.channels.contains(&Needed::Steer) && !steered {
         return Some("the steering angle was not recorded".to_owned());
+    }
+    if unit.evidence.is_by_reference() && info.channels == [Needed::Truth] {
+        return Some("no ground truth was used".to_owned());
     }
     if effect == Effect::ClockOffset && all_may_be_late(unit) {
         return Some(
@@ -121,7 +124,7 @@ fn omissions(effect: Effect, unit: &Unit<'_>, worth: &dyn Fn(&Omission, &Stretch
 /// An effect that was tried and changes no prediction of what was recorded.
 pub(crate) fn unseen(units: &[&Unit<'_>], (effect, whose): Entry) -> Untestable {
     let (robot, unit) = match whose {
-        Whose::Robot(robot) => (Some(robot.0), units.iter().find(|unit| unit.robot == robot)),
+        Whose::Robot(robot) => (Some(robot.0), units.iter().find(|unit| unit.robot() == robot)),
         Whose::Everyone => (None, units.first()),
     };
     let mut why = "it would change nothing of what can be compared".to_owned();

@@ -10,6 +10,7 @@ use crate::diagnosis::starts::Placing;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Column, Unit};
+use crate::diagnosis::white::{White, dot, symmetric};
 
 /// A linearization is kept as long as steps lower the cost by less than this.
 const RELINEARIZE: f64 = 0.5;
@@ -67,11 +68,17 @@ impl Fit {
 
 /// Residuals of every unit under terms; `None` if a prediction is no finite number.
 pub(crate) fn states(units: &[&Unit<'_>], terms: &[Term]) -> Option<Vec<State>> {
-    let state = |unit: &&Unit<'_>| {
+    states_at(units, terms, None)
+}
+
+/// The same, at the noise of the meshes of other states.
+pub(crate) fn states_at(units: &[&Unit<'_>], terms: &[Term], known: Option<&[State]>) -> Option<Vec<State>> {
+    let state = |(index, unit): (usize, &&Unit<'_>)| {
         let residuals = residuals(unit, terms, &|_| true, None)?;
-        Some(State { noise: noise::estimate(unit, terms, &residuals), residuals })
+        let known = known.and_then(|known| known.get(index)).map(|state| &state.noise);
+        Some(State { noise: noise::estimate(unit, terms, &residuals, known), residuals })
     };
-    units.iter().map(state).collect()
+    units.iter().enumerate().map(state).collect()
 }
 
 /// The states of units to whose terms one is added.
@@ -79,7 +86,8 @@ pub(crate) fn with_another(units: &[&Unit<'_>], known: &[State], terms: &[Term])
     let added = terms.last()?.effect;
     let state = |(unit, state): (&&Unit<'_>, &State)| {
         let residuals = residuals(unit, terms, &|channel| touches(added, channel), Some(&state.residuals))?;
-        Some(State { noise: noise::estimate(unit, terms, &residuals), residuals })
+        let noise = noise::estimate(unit, terms, &residuals, Some(&state.noise));
+        Some(State { noise, residuals })
     };
     units.iter().zip(known).map(state).collect()
 }
@@ -93,7 +101,7 @@ pub(crate) fn residuals(
 ) -> Option<Vec<f64>> {
     let wanted = |channel: Channel| known.is_none() || channels(channel);
     let mut all = known.map_or_else(|| vec![0.0; unit.rows.len()], <[f64]>::to_vec);
-    let values = unit.values(&unit.model(terms), &wanted);
+    let values = unit.values(terms, &wanted);
     for (stretch, values) in unit.stretches.iter().zip(values) {
         match values {
             Some(values) => all[stretch.range()].copy_from_slice(&values),
@@ -113,6 +121,18 @@ pub(crate) fn fit(
     effort: Effort,
 ) -> Option<Fit> {
     let states = states(units, &terms)?;
+    Some(fit_from(units, terms, states, movable, effort, &|_| None))
+}
+
+/// The same at the noise of the meshes of other states.
+pub(crate) fn fit_at(
+    units: &[&Unit<'_>],
+    terms: Vec<Term>,
+    known: &[State],
+    movable: &dyn Fn(usize) -> bool,
+    effort: Effort,
+) -> Option<Fit> {
+    let states = states_at(units, &terms, Some(known))?;
     Some(fit_from(units, terms, states, movable, effort, &|_| None))
 }
 
@@ -156,7 +176,7 @@ pub(crate) fn fit_from(
         let Some(step) = improve(units, &states, &terms, &slots, &normal, &mut damping) else { break };
         terms = step.terms;
         for ((state, residuals), unit) in states.iter_mut().zip(step.residuals).zip(units) {
-            state.noise = noise::estimate(unit, &terms, &residuals);
+            state.noise = noise::estimate(unit, &terms, &residuals, Some(&state.noise));
             state.residuals = residuals;
         }
         if step.gain > RELINEARIZE {
@@ -186,7 +206,15 @@ fn improve(
     normal: &Normal,
     damping: &mut f64,
 ) -> Option<Step> {
-    let before: f64 = states.iter().map(|state| cost(state, &state.residuals)).sum();
+    let all = |residuals: &mut dyn Iterator<Item = &Vec<f64>>| -> f64 {
+        units
+            .iter()
+            .zip(states)
+            .zip(residuals)
+            .map(|((unit, state), own)| cost(unit, &state.noise, own))
+            .sum()
+    };
+    let before = all(&mut states.iter().map(|state| &state.residuals));
     let moving = |channel: Channel| slots.iter().any(|&(term, _)| touches(terms[term].effect, channel));
     while *damping < MAX_DAMPING {
         if let Some(step) = normal.step(*damping) {
@@ -196,8 +224,7 @@ fn improve(
             };
             let residuals: Option<Vec<_>> = units.iter().zip(states).map(evaluate).collect();
             if let Some(residuals) = residuals {
-                let after: f64 =
-                    states.iter().zip(&residuals).map(|(state, residuals)| cost(state, residuals)).sum();
+                let after = all(&mut residuals.iter());
                 if after < before {
                     *damping = (*damping * 0.1).max(1e-9);
                     return Some(Step { terms: moved, residuals, gain: before - after });
@@ -220,10 +247,9 @@ fn stepped(terms: &[Term], slots: &[Slot], step: &DVector<f64>) -> Vec<Term> {
     moved
 }
 
-/// The cost of residuals at the noise of a state.
-fn cost(state: &State, residuals: &[f64]) -> f64 {
-    let of = |(value, sigma): (&f64, &f64)| noise::rho(value / sigma);
-    0.5 * residuals.iter().zip(&state.noise.sigma).map(of).sum::<f64>()
+/// The cost of residuals at a noise.
+pub(crate) fn cost(unit: &Unit<'_>, noise: &Noise, residuals: &[f64]) -> f64 {
+    0.5 * noise.whitened(unit, residuals).into_iter().map(noise::rho).sum::<f64>()
 }
 
 /// The parameters of movable terms that are no labels.
@@ -253,22 +279,25 @@ fn linearize(units: &[&Unit<'_>], terms: &[Term], slots: &[Slot], open: &[bool],
 
 /// Columns of all slots for a unit; those of terms that do not act on it are empty.
 pub(crate) fn columns(unit: &Unit<'_>, terms: &[Term], slots: &[Slot]) -> Vec<Column> {
-    // The positions of the terms among the effects of the unit's model.
-    let mut next = unit.nominal.effects.len()..;
-    let places: Vec<Option<usize>> =
-        terms.iter().map(|term| term.acts_on(unit.robot).then(|| next.next()).flatten()).collect();
-    let own: Vec<usize> = (0..slots.len()).filter(|&slot| places[slots[slot].0].is_some()).collect();
-    let variables: Vec<Variable> = own
-        .iter()
-        .filter_map(|&slot| {
-            let (term, parameter) = slots[slot];
-            Some(Variable::Effect { index: places[term]?, parameter })
-        })
-        .collect();
-    let show = |position: usize, channel: Channel| touches(terms[slots[own[position]].0].effect, channel);
     let mut all = vec![Column::empty(unit); slots.len()];
-    for (slot, column) in own.iter().zip(unit.columns(&unit.model(terms), &variables, &show)) {
-        all[*slot] = column;
+    for (index, member) in unit.members.iter().enumerate() {
+        // The positions of the terms among the effects of the member's model.
+        let mut next = member.nominal.effects.len()..;
+        let places: Vec<Option<usize>> =
+            terms.iter().map(|term| term.acts_on(member.robot).then(|| next.next()).flatten()).collect();
+        let own: Vec<usize> = (0..slots.len()).filter(|&slot| places[slots[slot].0].is_some()).collect();
+        let variables: Vec<Variable> = own
+            .iter()
+            .filter_map(|&slot| {
+                let (term, parameter) = slots[slot];
+                Some(Variable::Effect { index: places[term]?, parameter })
+            })
+            .collect();
+        let show = |position: usize, channel: Channel| touches(terms[slots[own[position]].0].effect, channel);
+        let columns = unit.columns(index, &member.model(terms), &variables, &show);
+        for (slot, column) in own.iter().zip(columns) {
+            all[*slot].take(column);
+        }
     }
     all
 }
@@ -284,43 +313,20 @@ impl Normal {
     pub(crate) fn new(units: &[&Unit<'_>], states: &[State], columns: &[Vec<Column>], size: usize) -> Self {
         let mut normal = Self { information: DMatrix::zeros(size, size), gradient: DVector::zeros(size) };
         for ((unit, state), columns) in units.iter().zip(states).zip(columns) {
-            for which in 0..unit.stretches.len() {
-                normal.add(unit, state, columns, which);
+            let white = White::new(unit, state, columns);
+            for (which, stretch) in unit.stretches.iter().enumerate() {
+                let present: Vec<(usize, &[f64])> = white.columns(which).collect();
+                let errors = &white.errors[stretch.range()];
+                for (position, &(slot, part)) in present.iter().enumerate() {
+                    normal.gradient[slot] += dot(part, errors);
+                    for &(other, other_part) in &present[..=position] {
+                        normal.information[(slot, other)] += dot(part, other_part);
+                    }
+                }
             }
         }
-        for row in 0..size {
-            for column in row + 1..size {
-                normal.information[(row, column)] = normal.information[(column, row)];
-            }
-        }
+        symmetric(&mut normal.information);
         normal
-    }
-
-    /// Adds a stretch to the lower triangle.
-    fn add(&mut self, unit: &Unit<'_>, state: &State, columns: &[Column], which: usize) {
-        let present: Vec<(usize, &[f64])> = columns
-            .iter()
-            .enumerate()
-            .filter_map(|(slot, column)| Some((slot, column.parts[which].as_deref()?)))
-            .collect();
-        if present.is_empty() {
-            return;
-        }
-        let range = unit.stretches[which].range();
-        let (residuals, sigmas) = (&state.residuals[range.clone()], &state.noise.sigma[range]);
-        for (row, (&residual, &sigma)) in residuals.iter().zip(sigmas).enumerate() {
-            let weight = noise::weight(residual / sigma) / (sigma * sigma);
-            for (position, &(slot, part)) in present.iter().enumerate() {
-                let weighted = weight * part[row];
-                if weighted == 0.0 {
-                    continue;
-                }
-                self.gradient[slot] -= weighted * residual;
-                for &(other, other_part) in &present[..=position] {
-                    self.information[(slot, other)] += weighted * other_part[row];
-                }
-            }
-        }
     }
 
     /// The step of these equations with the diagonal raised by a share.

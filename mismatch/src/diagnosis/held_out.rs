@@ -65,7 +65,9 @@ pub(crate) fn left_out(units: &[&Unit<'_>], fit: &Fit, number: usize) -> (Vec<Te
             }
         }
         State {
-            noise: noise::estimate_from(unit, &terms, &residuals, &|index| training(unit, index)),
+            noise: noise::estimate_from(unit, &terms, &residuals, Some(&state.noise), &|index| {
+                training(unit, index)
+            }),
             residuals,
         }
     };
@@ -99,18 +101,22 @@ pub(crate) fn compared(units: &[&Unit<'_>], with: &[State], without: &[State]) -
 
 /// Adds the gain of each element to its block.
 fn add(unit: &Unit<'_>, with: &State, without: &State, blocks: &mut [f64], held: &dyn Fn(usize) -> bool) {
-    for index in (0..unit.rows.len()).filter(|&index| held(index)) {
-        blocks[unit.block_of[index]] += gain(with, without, index);
+    for (index, gain) in gains(unit, with, without).into_iter().enumerate() {
+        if held(index) {
+            blocks[unit.block_of[index]] += gain;
+        }
     }
 }
 
-/// Log-density that an element gains by the better model, both at the noise of the better one: a model gains
+/// Log-density that each element gains by the better model, both at the noise of the better one: a model gains
 /// by what it predicts, not by claiming less noise where errors are small and more where they are not. What
 /// is farther off than [`noise::CLIP`] sigmas counts as that far, so that no instant outweighs the rest.
-pub(crate) fn gain(with: &State, without: &State, index: usize) -> f64 {
-    let sigma = with.noise.sigma[index];
-    let square = |state: &State| (state.residuals[index] / sigma).abs().min(noise::CLIP).powi(2);
-    0.5 * (square(without) - square(with))
+pub(crate) fn gains(unit: &Unit<'_>, with: &State, without: &State) -> Vec<f64> {
+    let squares = |state: &State| -> Vec<f64> {
+        let errors = with.noise.whitened(unit, &state.residuals);
+        errors.into_iter().map(|error| error.abs().min(noise::CLIP).powi(2)).collect()
+    };
+    squares(without).into_iter().zip(squares(with)).map(|(without, with)| 0.5 * (without - with)).collect()
 }
 
 /// Sum over blocks; its variance with the covariance of neighbours (`newey1987`, one lag).

@@ -17,7 +17,7 @@ use crate::diagnosis::naming::{Estimated, Z_95, groups, total};
 use crate::diagnosis::profile::{Profile, polish};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::robust::{Robust, robust};
-use crate::diagnosis::run::{Prepared, unit};
+use crate::diagnosis::run::{Prepared, member};
 use crate::diagnosis::select::{Scored, fit_beside, score, whites};
 use crate::diagnosis::spread::{is_of_spread, known, known_swap};
 use crate::diagnosis::term::{Term, Whose};
@@ -101,7 +101,9 @@ pub fn fit_known(
     let prepared = Prepared { recording, evidence, models, tested: false };
     let shared = effects.iter().any(|effect| is_shared(effect.info()));
     let concerned = prepared.models.iter().filter(|(own, _)| shared || **own == robot);
-    let mut all: Vec<Unit<'_>> = concerned.map(|(&own, model)| unit(0, &prepared, own, model)).collect();
+    let mut all: Vec<Unit<'_>> = concerned
+        .map(|(&own, model)| Unit::new(&prepared.evidence, 0, vec![member(recording, own, model)]))
+        .collect();
     // Sightings under wrong names are put right before anything is fitted.
     let swapped = effects.contains(&Effect::LandmarkIdentitySwap).then(|| known_swap(&mut all)).flatten();
     let units: Vec<&Unit<'_>> = all.iter().filter(|unit| !unit.rows.is_empty()).collect();
@@ -226,7 +228,7 @@ fn known_fit(
     }
     KnownFit {
         effect: term.effect,
-        robots: units.iter().map(|unit| unit.robot).filter(|&robot| term.acts_on(robot)).collect(),
+        robots: units.iter().flat_map(|unit| unit.acted_on(term)).map(|member| member.robot).collect(),
         parameters,
         total: None,
     }

@@ -43,7 +43,7 @@ pub(crate) fn linearized(
         }
     });
     let empty = |request: &Request| -> Vec<(usize, Vec<Column>)> {
-        let acting = (0..units.len()).filter(|&unit| request.term.acts_on(units[unit].robot));
+        let acting = (0..units.len()).filter(|&unit| units[unit].has(&request.term));
         acting.map(|unit| (unit, vec![Column::empty(units[unit]); request.along.len().max(1)])).collect()
     };
     let mut all: Vec<Vec<(usize, Vec<Column>)>> = requests.iter().map(empty).collect();
@@ -74,8 +74,9 @@ pub(crate) fn linearized(
 fn jobs(units: &[&Unit<'_>], requests: &[Request]) -> Vec<Job> {
     let mut jobs = Vec::new();
     for (index, unit) in units.iter().enumerate() {
-        let own = || requests.iter().enumerate().filter(|(_, request)| request.term.acts_on(unit.robot));
         for group in unit.groups() {
+            let robot = unit.members[unit.stretches[group[0]].member].robot;
+            let own = || requests.iter().enumerate().filter(|(_, request)| request.term.acts_on(robot));
             let channels = || group.iter().map(|&which| unit.stretches[which].channel);
             let showing =
                 own().filter(|(_, request)| channels().any(|channel| touches(request.term.effect, channel)));
@@ -92,7 +93,8 @@ fn jobs(units: &[&Unit<'_>], requests: &[Request]) -> Vec<Job> {
             let chunks = rest.chunks(MOST_AT_ONCE).map(<[_]>::to_vec).chain(pushes);
             jobs.extend(chunks.map(|slots| Job::Slopes { unit: index, group: group.clone(), slots }));
         }
-        let whole = own().filter(|(_, request)| request.along.is_empty());
+        let own = requests.iter().enumerate().filter(|(_, request)| unit.has(&request.term));
+        let whole = own.filter(|(_, request)| request.along.is_empty());
         jobs.extend(whole.map(|(request, _)| Job::Whole { unit: index, request }));
     }
     jobs
@@ -106,7 +108,8 @@ fn slopes(
     group: &[usize],
     slots: &[(usize, usize)],
 ) -> Vec<Values> {
-    let mut model = unit.model(terms);
+    let Some(&first) = group.first() else { return Vec::new() };
+    let mut model = unit.members[unit.stretches[first].member].model(terms);
     let mut variables = Vec::with_capacity(slots.len());
     let mut before = None;
     for &(request, position) in slots {

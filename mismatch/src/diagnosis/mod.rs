@@ -4,6 +4,9 @@
 //! [`starts`] say what could be added, [`white`] tests it, [`select`] adds and prunes, [`support`],
 //! [`held_out`] and [`naming`] decide what may be said of it, [`spread`] does the same for effects that leave the
 //! mean of the residuals where it is, [`run`] joins them.
+//!
+//! Without truth, [`mesh`] says how the residuals of a team hang together, and [`mesh_filter`] makes innovations of
+//! them.
 
 mod candidate;
 mod chi_square;
@@ -14,6 +17,8 @@ mod held_out;
 mod known;
 mod lag;
 mod linearize;
+mod mesh;
+mod mesh_filter;
 mod naming;
 mod noise;
 mod power;
@@ -32,6 +37,8 @@ mod term;
 mod touch;
 mod unit;
 mod white;
+mod without_truth;
 
 pub use known::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known};
+pub(crate) use mesh::{LOST, STATES, about, carried, gradient};
 pub(crate) use run::run;

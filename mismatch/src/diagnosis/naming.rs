@@ -16,6 +16,7 @@ use crate::diagnosis::select::{FAMILYWISE, wald};
 use crate::diagnosis::starts::Placing;
 use crate::diagnosis::support::Support;
 use crate::diagnosis::term::Term;
+use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Row, Unit};
 use crate::findings::{Estimate, Place, Verdict};
 
@@ -115,11 +116,13 @@ impl Estimated {
     fn is_relevant(&self, unit: &Unit<'_>) -> Option<bool> {
         let mut known = None;
         for (index, parameter) in self.term.parameters().iter().enumerate() {
-            let threshold = parameter.relevance.threshold(&unit.floors);
             let Some(error) = self.errors[index] else { continue };
-            if threshold > 0.0 {
-                let size = (self.term.values[index] - parameter.off).abs();
-                known = Some(known.unwrap_or(false) || size - NEAR_END * error > threshold);
+            for member in unit.acted_on(&self.term) {
+                let threshold = parameter.relevance.threshold(&member.floors);
+                if threshold > 0.0 {
+                    let size = (self.term.values[index] - parameter.off).abs();
+                    known = Some(known.unwrap_or(false) || size - NEAR_END * error > threshold);
+                }
             }
         }
         known
@@ -178,7 +181,7 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
         }
     });
     let place = place(&acting, support, &main.term);
-    let channel = channel(&acting, support);
+    let channel = channel(&acting, support, effect);
     if verdict.is_some() {
         let profile = Profile::new(&acting, fit);
         for (own, &position) in estimated.iter_mut().zip(group) {
@@ -203,7 +206,7 @@ pub(crate) fn total(
     let slot = |term: &usize| fit.slots.iter().position(|slot| *slot == (*term, 0));
     let slots: Vec<usize> = group.iter().map(slot).collect::<Option<_>>()?;
     let mut parts: Vec<(usize, f64)> = slots.into_iter().map(|slot| (slot, 1.0)).collect();
-    let acting = || units.iter().filter(|unit| main.acts_on(unit.robot));
+    let acting = || units.iter().filter(|unit| unit.has(main));
     let middles = acting().map(|unit| f64::midpoint(unit.span_s.0, unit.span_s.1));
     let middle_s = middles.sum::<f64>() / acting().count().max(1) as f64;
     for (position, &(term, parameter)) in fit.slots.iter().enumerate() {
@@ -213,7 +216,7 @@ pub(crate) fn total(
             Effect::ClockDrift => 1e-6 * middle_s,
             _ => continue,
         };
-        if parameter == 0 && acting().all(|unit| own.acts_on(unit.robot)) {
+        if parameter == 0 && acting().all(|unit| unit.has(own)) {
             parts.push((position, -seconds));
         }
     }
@@ -253,7 +256,7 @@ pub(crate) fn twin(effect: Effect) -> Option<Effect> {
 
 /// Whether a term acts on robots without encoders only.
 pub(crate) fn is_unseen(units: &[&Unit<'_>], term: &Term) -> bool {
-    let mut acting = units.iter().filter(|unit| term.acts_on(unit.robot)).peekable();
+    let mut acting = units.iter().filter(|unit| unit.has(term)).peekable();
     acting.peek().is_some() && acting.all(|unit| unit.stretch(Channel::CommandedBody).is_some())
 }
 
@@ -268,12 +271,11 @@ fn changes_enough(units: &[&Unit<'_>], support: &Support) -> bool {
     let (mut changed, mut all) = (0_usize, 0_usize);
     for (index, unit) in units.iter().enumerate() {
         let (with, without) = (&support.with.states[index], &support.without.states[index]);
+        let whitened = |residuals: &[f64]| with.noise.whitened(unit, residuals);
+        let (with, without) = (whitened(&with.residuals), whitened(&without.residuals));
         for stretch in &unit.stretches {
             let range = stretch.range();
-            let in_stretch = range
-                .clone()
-                .filter(|&row| (with.residuals[row] - without.residuals[row]).abs() > with.noise.sigma[row])
-                .count();
+            let in_stretch = range.clone().filter(|&row| (with[row] - without[row]).abs() > 1.0).count();
             if in_stretch > 0 {
                 changed += in_stretch;
                 all += range.len();
@@ -283,8 +285,15 @@ fn changes_enough(units: &[&Unit<'_>], support: &Support) -> bool {
     changed as f64 > LEAST_SHARE_CHANGED * all as f64
 }
 
-/// The channel in which the term gains most.
-fn channel(units: &[&Unit<'_>], support: &Support) -> Channel {
+/// The channel in which the term gains most. In a mesh all that a robot does shows in the readings: there it is the
+/// first along the signal chain in which the effect can show.
+fn channel(units: &[&Unit<'_>], support: &Support, effect: Effect) -> Channel {
+    if let Some(unit) = units.iter().find(|unit| unit.mesh.is_some()) {
+        let shows = |channel: &Channel| touches(effect, *channel) && unit.stretch(*channel).is_some();
+        if let Some(channel) = Channel::ALL.into_iter().find(|channel| shows(channel)) {
+            return channel;
+        }
+    }
     let mut gains: BTreeMap<Channel, f64> = BTreeMap::new();
     for (index, unit) in units.iter().enumerate() {
         let (with, without) = (&support.with.states[index].noise, &support.without.states[index].noise);
@@ -325,8 +334,8 @@ fn place(units: &[&Unit<'_>], support: &Support, term: &Term) -> Place {
     let mut count = 0;
     for (index, unit) in units.iter().enumerate() {
         let (with, without) = (&support.with.states[index], &support.without.states[index]);
-        for (row, meaning) in unit.rows.iter().enumerate() {
-            let gain = held_out::gain(with, without, row);
+        let each = held_out::gains(unit, with, without);
+        for (meaning, gain) in unit.rows.iter().zip(each) {
             total += gain;
             count += 1;
             for ((_, holds), (sum, number)) in REGIMES.iter().zip(gains.iter_mut().zip(&mut counts)) {

@@ -4,9 +4,13 @@
 //! it is for a normal distribution. For normal residuals it is their standard deviation; up to a tenth of wild
 //! ones moves it little. With the scales profiled out, a model's log-likelihood is `-sum n log s`.
 
+use std::sync::Arc;
+
 use crate::channel::Channel;
+use crate::diagnosis::mesh::{Event, Mesh, Read, is_meshed, is_move};
+use crate::diagnosis::mesh_filter::{Filter, LANES};
 use crate::diagnosis::term::Term;
-use crate::diagnosis::unit::Unit;
+use crate::diagnosis::unit::{Column, Unit};
 
 /// A residual counts as this many sigmas at most.
 pub(crate) const CLIP: f64 = 5.0;
@@ -23,6 +27,10 @@ const ELSEWHERE_SCALES: f64 = 20.0;
 const SMALLEST: f64 = 1e-12;
 /// Rounds in which scale and the share of agitated variance settle.
 const AGITATED_ROUNDS: usize = 4;
+/// From which scales of a mesh are estimated: of moves per root of a second, metres forward, left, radians.
+const MOVES: [f64; 3] = [0.01, 0.005, 0.01];
+/// Of readings of which no noise is declared: metres, radians.
+const READINGS: [f64; 2] = [0.1, 0.04];
 
 /// The noise of a unit.
 #[derive(Clone, Debug)]
@@ -36,6 +44,102 @@ pub(crate) struct Noise {
     pub(crate) log_likelihood: f64,
     /// The same per scale.
     pub(crate) per_scale: Vec<f64>,
+    /// What makes innovations of the residuals of a mesh. It stays while models are compared: what they predict is
+    /// judged at one noise.
+    pub(crate) filter: Option<Arc<Filter>>,
+}
+
+impl Noise {
+    /// Residuals in sigmas; of a mesh, its innovations.
+    pub(crate) fn whitened(&self, unit: &Unit<'_>, residuals: &[f64]) -> Vec<f64> {
+        let mut values = residuals.to_vec();
+        let filtered = unit.mesh.as_ref().zip(self.filter.as_ref());
+        if let Some((mesh, filter)) = filtered {
+            filter.innovate(mesh, &mut values);
+        }
+        for stretch in &unit.stretches {
+            if filtered.is_some() && is_meshed(stretch.channel) {
+                continue;
+            }
+            let range = stretch.range();
+            for (value, sigma) in values[range.clone()].iter_mut().zip(&self.sigma[range]) {
+                *value /= sigma;
+            }
+        }
+        self.forget_masked(unit, &mut values);
+        values
+    }
+
+    /// The same scales in the mesh of the same team at other references.
+    pub(crate) fn refiltered(&self, unit: &Unit<'_>) -> Option<Self> {
+        let filter = Filter::new(unit.mesh.as_ref()?, &self.scales, self.filter.as_ref()?.weights.clone());
+        Some(Self { filter: Some(Arc::new(filter)), ..self.clone() })
+    }
+
+    /// What is left out has an infinite sigma, in a mesh too.
+    fn forget_masked(&self, unit: &Unit<'_>, values: &mut [f64]) {
+        if unit.mesh.is_some() {
+            for (value, sigma) in values.iter_mut().zip(&self.sigma) {
+                if sigma.is_infinite() {
+                    *value = 0.0;
+                }
+            }
+        }
+    }
+
+    /// Derivatives in sigmas, by stretch; `None` of what is zero.
+    pub(crate) fn whitened_columns(&self, unit: &Unit<'_>, columns: &[Column]) -> Vec<Vec<Option<Vec<f64>>>> {
+        let filtered = unit.mesh.as_ref().zip(self.filter.as_ref());
+        let mut all: Vec<Vec<Option<Vec<f64>>>> =
+            columns.iter().map(|column| vec![None; column.parts.len()]).collect();
+        for (column, parts) in columns.iter().zip(&mut all) {
+            for ((own, part), stretch) in column.parts.iter().zip(parts).zip(&unit.stretches) {
+                if filtered.is_none() || !is_meshed(stretch.channel) {
+                    let sigmas = &self.sigma[stretch.range()];
+                    *part = own
+                        .as_ref()
+                        .map(|own| own.iter().zip(sigmas).map(|(value, sigma)| value / sigma).collect());
+                }
+            }
+        }
+        let Some((mesh, filter)) = filtered else { return all };
+        let shows = |column: &Column| {
+            let mut parts = column.parts.iter().zip(&unit.stretches);
+            parts.any(|(part, stretch)| part.is_some() && is_meshed(stretch.channel))
+        };
+        let shown: Vec<usize> = (0..columns.len()).filter(|&index| shows(&columns[index])).collect();
+        let mut lanes = vec![[0.0; LANES]; unit.rows.len()];
+        for chunk in shown.chunks(LANES) {
+            for (which, stretch) in
+                unit.stretches.iter().enumerate().filter(|(_, own)| is_meshed(own.channel))
+            {
+                for (lane, &index) in chunk.iter().enumerate() {
+                    match &columns[index].parts[which] {
+                        Some(part) => {
+                            for (values, value) in lanes[stretch.range()].iter_mut().zip(part) {
+                                values[lane] = *value;
+                            }
+                        }
+                        None => lanes[stretch.range()].iter_mut().for_each(|values| values[lane] = 0.0),
+                    }
+                }
+            }
+            filter.whiten_lanes(mesh, &mut lanes);
+            for (which, stretch) in unit.stretches.iter().enumerate() {
+                if !is_meshed(stretch.channel) || is_move(stretch.channel) || stretch.rows == 0 {
+                    continue;
+                }
+                let sigmas = &self.sigma[stretch.range()];
+                for (lane, &index) in chunk.iter().enumerate() {
+                    let of = |(values, sigma): (&[f64; LANES], &f64)| {
+                        if sigma.is_infinite() { 0.0 } else { values[lane] }
+                    };
+                    all[index][which] = Some(lanes[stretch.range()].iter().zip(sigmas).map(of).collect());
+                }
+            }
+        }
+        all
+    }
 }
 
 /// The factor by which a residual of `z` sigmas is weighted.
@@ -49,9 +153,9 @@ pub(crate) fn rho(z: f64) -> f64 {
     if size <= CLIP { z * z } else { CLIP * (2.0 * size - CLIP) }
 }
 
-/// Estimates the noise from residuals.
-pub(crate) fn estimate(unit: &Unit<'_>, terms: &[Term], residuals: &[f64]) -> Noise {
-    estimate_from(unit, terms, residuals, &|_| true)
+/// Estimates the noise from residuals; that of a mesh stays as it is known.
+pub(crate) fn estimate(unit: &Unit<'_>, terms: &[Term], residuals: &[f64], known: Option<&Noise>) -> Noise {
+    estimate_from(unit, terms, residuals, known, &|_| true)
 }
 
 /// Estimates the noise of all elements from those for which `kept` holds.
@@ -59,6 +163,7 @@ pub(crate) fn estimate_from(
     unit: &Unit<'_>,
     terms: &[Term],
     residuals: &[f64],
+    known: Option<&Noise>,
     kept: &dyn Fn(usize) -> bool,
 ) -> Noise {
     let agitation = unit.agitation(terms);
@@ -66,9 +171,19 @@ pub(crate) fn estimate_from(
     for (index, &scale) in unit.scale_of.iter().enumerate().filter(|(index, _)| kept(*index)) {
         members[scale].push(index);
     }
-    let mut noise =
-        Noise { sigma: Vec::new(), scales: Vec::new(), log_likelihood: 0.0, per_scale: Vec::new() };
-    for own in &members {
+    let mut noise = Noise {
+        sigma: Vec::new(),
+        scales: Vec::new(),
+        log_likelihood: 0.0,
+        per_scale: Vec::new(),
+        filter: None,
+    };
+    for (which, own) in members.iter().enumerate() {
+        if unit.mesh.is_some() && is_meshed(unit.scales[which].0) {
+            noise.scales.push(known.map_or_else(|| begin(unit, which), |known| known.scales[which]));
+            noise.per_scale.push(0.0);
+            continue;
+        }
         let agitated: Vec<f64> = own.iter().map(|&index| agitation[index]).collect();
         let values: Vec<f64> = own.iter().map(|&index| residuals[index]).collect();
         let mut spreads = vec![1.0; own.len()];
@@ -97,7 +212,68 @@ pub(crate) fn estimate_from(
         }
     };
     noise.sigma = agitation.iter().zip(&unit.scale_of).zip(residuals).map(sigma).collect();
+    if let Some(mesh) = &unit.mesh {
+        mesh_noise(unit, mesh, residuals, known, kept, &mut noise);
+    }
     noise
+}
+
+/// Where the estimate of a scale of a mesh begins: with what is declared.
+fn begin(unit: &Unit<'_>, scale: usize) -> f64 {
+    let (channel, component) = unit.scales[scale];
+    let stretch =
+        unit.stretches.iter().find(|own| own.rows > 0 && unit.scale_of[own.offset] + component == scale);
+    let Some(member) = stretch.map(|own| &unit.members[own.member]) else { return 1.0 };
+    let nominal = &member.nominal.nominal;
+    let or = |declared: f64, else_: f64| if declared > 0.0 { declared } else { else_ };
+    match channel {
+        Channel::Gps => or(nominal.gps_sigma_m, READINGS[0]),
+        Channel::Heading => or(nominal.heading_sigma_rad, READINGS[1]),
+        Channel::RangeToLandmark | Channel::RangeToRobot => or(nominal.range_sigma_m, READINGS[0]),
+        Channel::BearingToLandmark | Channel::BearingToRobot => or(nominal.bearing_sigma_rad, READINGS[1]),
+        Channel::Actuator | Channel::Body | Channel::CommandedBody | Channel::Gyro => MOVES[component],
+    }
+}
+
+/// The noise of a mesh: its filter, the sigmas of its innovations, and their likelihood.
+fn mesh_noise(
+    unit: &Unit<'_>,
+    mesh: &Mesh,
+    residuals: &[f64],
+    known: Option<&Noise>,
+    kept: &dyn Fn(usize) -> bool,
+    noise: &mut Noise,
+) {
+    let filter = known.and_then(|known| known.filter.clone()).unwrap_or_else(|| {
+        let begun = noise.scales.clone();
+        let used = |read: &Read, residual: f64| {
+            !is_elsewhere(unit.scales[read.scale].0, residual, begun[read.scale])
+        };
+        Arc::new(Filter::estimated(mesh, &mut noise.scales, residuals, &used))
+    });
+    let reads = mesh.events.iter().filter_map(|event| match event {
+        Event::Read(own) => Some(own),
+        _ => None,
+    });
+    for (read, root) in reads.zip(&filter.roots) {
+        noise.sigma[read.element] = if *root > 0.0 { 1.0 / root } else { f64::INFINITY };
+    }
+    for stretch in unit.stretches.iter().filter(|own| is_move(own.channel)) {
+        for index in stretch.range() {
+            noise.sigma[index] = noise.scales[unit.scale_of[index]];
+        }
+    }
+    noise.filter = Some(filter);
+    let whitened = noise.whitened(unit, residuals);
+    for event in &mesh.events {
+        let Event::Read(read) = event else { continue };
+        if !kept(read.element) || noise.sigma[read.element].is_infinite() {
+            continue;
+        }
+        let cost = noise.sigma[read.element].ln() + 0.5 * rho(whitened[read.element]);
+        noise.per_scale[read.scale] -= cost;
+        noise.log_likelihood -= cost;
+    }
 }
 
 /// Whether a residual is that of a bearing of something else than its name says.

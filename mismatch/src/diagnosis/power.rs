@@ -29,8 +29,8 @@ pub(crate) fn undetected(units: &[&Unit<'_>], scored: &[Scored], tests: usize) -
             }
             let threshold = units
                 .iter()
-                .filter(|unit| term.acts_on(unit.robot))
-                .map(|unit| term.parameters()[parameter].relevance.threshold(&unit.floors))
+                .flat_map(|unit| unit.acted_on(term))
+                .map(|member| term.parameters()[parameter].relevance.threshold(&member.floors))
                 .fold(f64::INFINITY, f64::min);
             if !threshold.is_finite() || threshold <= 0.0 {
                 continue;

@@ -7,9 +7,8 @@ use pleiad_physics::{Effect, Fit as How, Parameter};
 
 use crate::body::PUSH_S;
 use crate::channel::Channel;
-use crate::diagnosis::fit::{Effort, Fit, Normal, Slot, State, columns, fit, residuals};
+use crate::diagnosis::fit::{Effort, Fit, Normal, Slot, State, columns, cost, fit, residuals};
 use crate::diagnosis::naming::Z_95;
-use crate::diagnosis::noise;
 use crate::diagnosis::starts::{Placing, thresholds};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
@@ -95,7 +94,8 @@ impl<'u, 'a> Profile<'u, 'a> {
                     residuals(unit, &terms, &|channel| touches(effect, channel), Some(&known.residuals))?;
                 states.push(State { residuals, noise: known.noise.clone() });
             }
-            let cost: f64 = states.iter().map(cost).sum();
+            let each = units.iter().zip(&states);
+            let cost: f64 = each.map(|(unit, state)| cost(unit, &state.noise, &state.residuals)).sum();
             if slots.is_empty() {
                 return Some((-cost, terms.swap_remove(slot.0)));
             }
@@ -116,7 +116,7 @@ impl<'u, 'a> Profile<'u, 'a> {
     /// Whether a parameter can matter to a unit: a place only to a robot that came near it.
     fn concerns(&self, slot: Slot, unit: usize) -> bool {
         let term = &self.fit.terms[slot.0];
-        if !term.acts_on(self.units[unit].robot) {
+        if !self.units[unit].has(term) {
             return false;
         }
         let Some(first) = Placing::of(term.effect.info()).region else { return true };
@@ -172,7 +172,9 @@ impl<'u, 'a> Profile<'u, 'a> {
     /// The longest usual step of the encoders, seconds: predictions act in such steps and have no onset within
     /// one.
     fn step_s(&self) -> f64 {
-        let tracks = self.units.iter().filter_map(|unit| unit.evidence.tracks.get(&unit.robot));
+        let tracks = self.units.iter().flat_map(|unit| {
+            unit.members.iter().filter_map(|member| unit.evidence.tracks.get(&member.robot))
+        });
         let steps = tracks.map(|track| median_step(track.encoders.iter().map(|sample| sample.time_s)));
         steps.filter(|step_s| step_s.is_finite()).fold(0.0, f64::max)
     }
@@ -182,7 +184,7 @@ impl<'u, 'a> Profile<'u, 'a> {
         let mut found = Vec::new();
         for unit in self.units {
             let (Some(stretch), Some(track)) =
-                (unit.stretch(Channel::Body), unit.evidence.tracks.get(&unit.robot))
+                (unit.stretch(Channel::Body), unit.evidence.tracks.get(&unit.robot()))
             else {
                 continue;
             };
@@ -235,11 +237,6 @@ impl<'u, 'a> Profile<'u, 'a> {
         }
         Some([value + near, value + far])
     }
-}
-
-fn cost(state: &State) -> f64 {
-    let of = |(value, sigma): (&f64, &f64)| noise::rho(value / sigma);
-    0.5 * state.residuals.iter().zip(&state.noise.sigma).map(of).sum::<f64>()
 }
 
 /// The first and the last step of a search, in the unit of the parameter.

@@ -174,6 +174,10 @@ fn free(
         let of =
             |values: &[f64]| -> Vec<f64> { values.iter().skip(component).step_by(count).copied().collect() };
         let own = of(errors);
+        // Of moves in a mesh nothing is left.
+        if own.iter().all(|value| *value == 0.0) {
+            continue;
+        }
         let Some(average) = Average::likeliest(&own, &links) else { continue };
         let freed = average.freed(&own);
         let scale = (freed.iter().map(|value| value * value).sum::<f64>() / freed.len() as f64).sqrt();

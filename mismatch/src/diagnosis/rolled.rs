@@ -38,7 +38,7 @@ pub(crate) struct Rolled {
 
 /// Rolls out every robot that something was found of, and the others under the nominal model alone.
 pub(crate) fn robots(roller: &Roller<'_, '_>, kept: &[Term]) -> BTreeMap<RobotId, Rolled> {
-    let mut robots: Vec<RobotId> = roller.units.iter().map(|unit| unit.robot).collect();
+    let mut robots: Vec<RobotId> = roller.units.iter().map(|unit| unit.robot()).collect();
     robots.sort_unstable();
     robots.dedup();
     let rolled = parallel::map(&robots, |&robot| {
@@ -83,7 +83,7 @@ struct Rolling<'r, 'a> {
 impl<'r, 'a> Rolling<'r, 'a> {
     fn new(roller: &Roller<'r, 'a>, robot: RobotId) -> Self {
         let own = |units: &'r [&'r Unit<'a>]| -> Vec<&'r Unit<'a>> {
-            units.iter().copied().filter(|unit| unit.robot == robot).collect()
+            units.iter().copied().filter(|unit| unit.robot() == robot).collect()
         };
         let (fitted, tests) = (own(roller.units), own(roller.tests));
         let tested = !tests.is_empty();
@@ -99,11 +99,11 @@ impl<'r, 'a> Rolling<'r, 'a> {
     fn sums(&self, fit: Option<&Fit>) -> Sums {
         let mut sums = vec![[0.0; 3]; HORIZONS_S.len()];
         let roll = |unit: &Unit<'_>, planned: &Planned, model: &RobotModel<f64>| {
-            planned.rollouts(&self.prepared[unit.recording].evidence, unit.robot, model)
+            planned.rollouts(&self.prepared[unit.recording].evidence, unit.robot(), model)
         };
         if self.tested || fit.is_none_or(|fit| fit.slots.is_empty()) {
             for (unit, planned) in &self.rolled {
-                let model = fit.map_or_else(|| unit.nominal.clone(), |fit| unit.model(&fit.terms));
+                let model = fit.map_or_else(|| unit.nominal().clone(), |fit| unit.model(&fit.terms));
                 add(&mut sums, &roll(unit, planned, &model), &|_| true);
             }
         } else if let Some(fit) = fit {
@@ -138,7 +138,7 @@ pub(crate) fn of_finding(
 ) -> Vec<RollOut> {
     let effect = own.judged.estimated[0].term.effect;
     let without = REFITTED.contains(&effect).then_some(effect);
-    let mut robots: Vec<RobotId> = own.support.units.iter().map(|&unit| units[unit].robot).collect();
+    let mut robots: Vec<RobotId> = own.support.units.iter().map(|&unit| units[unit].robot()).collect();
     robots.sort_unstable();
     robots.dedup();
     horizons(&robots.iter().filter_map(|robot| rolled.get(robot)).collect::<Vec<_>>(), without)
@@ -148,7 +148,7 @@ pub(crate) fn of_finding(
 pub(crate) fn per_robot(rolled: &BTreeMap<RobotId, Rolled>, units: &[&Unit<'_>]) -> Vec<RobotRollOuts> {
     let one = |(&robot, rolled): (&RobotId, &Rolled)| {
         let horizons = horizons(&[rolled], None);
-        let own = units.iter().filter(|unit| unit.robot == robot);
+        let own = units.iter().filter(|unit| unit.robot() == robot);
         let speeds: Vec<f64> =
             own.flat_map(|unit| unit.rows.iter().map(|row| row.regime.speed_m_s.abs())).collect();
         let speed_m_s = speeds.iter().sum::<f64>() / speeds.len().max(1) as f64;

@@ -1,5 +1,6 @@
 //! The pipeline: compare, select, judge, show.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_estimation::RobotId;
@@ -18,10 +19,11 @@ use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
 use crate::diagnosis::select::{Entry, Pool, Selected, select};
 use crate::diagnosis::series;
-use crate::diagnosis::spread::{self, SpreadTerm};
+use crate::diagnosis::spread::{self, Spread, SpreadTerm};
 use crate::diagnosis::support::{Support, support};
 use crate::diagnosis::term::{Term, Whose};
-use crate::diagnosis::unit::Unit;
+use crate::diagnosis::unit::{Member, Unit};
+use crate::diagnosis::without_truth::{Moved, again, alone_under, teams, withheld};
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
 use crate::findings::{Estimate, Finding, Findings, HeldOut, Untestable, Verdict};
@@ -48,36 +50,64 @@ pub(crate) struct Judgement {
 }
 
 pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Diagnosis, MismatchError> {
-    if options.truth == TruthUse::No {
-        return Err(MismatchError::WithoutTruth);
-    }
     let tested = roles(recordings, options)?;
+    let by_reference = options.truth == TruthUse::No;
+    let changed = by_reference || options.without_landmarks;
+    let recordings: Cow<'_, [Recording]> =
+        if changed { withheld(recordings, options)?.into() } else { recordings.into() };
+    let recordings = &*recordings;
     let mut prepared = Vec::new();
     for (recording, role) in recordings.iter().zip(tested) {
         let Some(tested) = role else { continue };
         let models = builtin::models(recording)?;
-        let evidence = Evidence::new(recording, &models);
+        let evidence = if by_reference {
+            Evidence::by_reference(recording, &models)
+        } else {
+            Evidence::new(recording, &models)
+        };
         prepared.push(Prepared { recording, evidence, models, tested });
     }
     let mut all: Vec<Unit<'_>> = prepared
         .iter()
         .enumerate()
         .flat_map(|(index, own)| own.models.iter().map(move |(&robot, model)| (index, own, robot, model)))
-        .map(|(index, own, robot, model)| unit(index, own, robot, model))
+        .map(|(index, own, robot, model)| {
+            Unit::new(&own.evidence, index, vec![member(own.recording, robot, model)])
+        })
         .collect();
     let swaps = spread::swaps(&mut all);
     let fitted: Vec<&Unit<'_>> = all.iter().filter(|unit| !prepared[unit.recording].tested).collect();
-    let enough = |unit: &&Unit<'_>| lasting_s(&fitted, unit.robot) >= SHORT_S;
+    let enough = |unit: &&Unit<'_>| lasting_s(&fitted, unit.robot()) >= SHORT_S;
     let units: Vec<&Unit<'_>> =
         fitted.iter().copied().filter(|unit| !unit.rows.is_empty()).filter(enough).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
+    let teams = if by_reference { teams(&all, &prepared)? } else { Vec::new() };
+    let (alone, tests_alone) = (units, tests);
+    let (units, tests): (Vec<&Unit<'_>>, Vec<&Unit<'_>>) = if by_reference {
+        teams.iter().partition(|unit| !prepared[unit.recording].tested)
+    } else {
+        (alone.clone(), tests_alone.clone())
+    };
     let mut entries = entries(&fitted);
     let tried = entries.entries.len() + entries.untestable.len();
-    let spread_entries = spread::take(&mut entries, &units);
+    let spread_entries = spread::take(&mut entries, &alone);
 
     let mut notes = notes(&prepared, &all, &fitted);
-    let selected = select(&units, &entries.entries);
+    let mut selected = select(&units, &entries.entries, Vec::new());
+    // References far from where the findings have them are not linear enough: once more where they should be.
+    let moved = match &selected {
+        Some(first) if by_reference && !first.fit.terms.is_empty() => Moved::new(&units, &first.fit),
+        _ => None,
+    };
+    let evidence = moved.as_ref().map_or_else(Vec::new, |moved| moved.evidence(&units));
+    let again = if moved.is_some() { again(&units, &evidence) } else { None };
+    let units: Vec<&Unit<'_>> = again.as_ref().map_or(units, |again| again.iter().collect());
+    if again.is_some()
+        && let Some(first) = selected.take()
+    {
+        selected = select(&units, &entries.entries, first.fit.terms);
+    }
     let Some(Selected { fit, tests: count, mut pool }) = selected else {
         return Ok(nothing(&prepared, entries, notes, units.is_empty()));
     };
@@ -86,10 +116,13 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     };
     let count = count + spread_entries.len() + swaps.tests;
     let scored = pool.scored(&units, &entries.entries, &fit);
-    entries.untestable.extend(hidden(&units, &entries.entries, &fit, &pool));
+    entries.untestable.extend(hidden(&alone, &entries.entries, &fit, &pool));
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
-    let spread = spread::spread(&units, &tests, &fit, &spread_entries, &swaps, count);
+    let fit_alone = if by_reference { alone_under(&alone, &fit) } else { Some(fit.clone()) };
+    let spread = fit_alone.as_ref().map_or_else(Spread::default, |fit| {
+        spread::spread(&alone, &tests_alone, fit, &spread_entries, &swaps, count)
+    });
     spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
@@ -117,7 +150,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
 
     let roller = Roller { prepared: &prepared, units: &units, tests: &tests };
     let kept = kept(&fit, &judgements);
-    let rolled = rolled::robots(&roller, &kept);
+    // Nothing but truth says where a roll-out should have ended.
+    let rolled = if by_reference { BTreeMap::new() } else { rolled::robots(&roller, &kept) };
     let mut findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
     findings.extend(spread.found().into_iter().map(SpreadTerm::finding));
     let mut undetected = undetected(&units, &scored, count);
@@ -171,20 +205,16 @@ fn roles(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Vec<Opti
     Ok(roles)
 }
 
-pub(crate) fn unit<'a>(
-    index: usize,
-    own: &'a Prepared<'a>,
-    robot: RobotId,
-    model: &RobotModel<f64>,
-) -> Unit<'a> {
-    let floors = own.recording.nominal.as_ref().map_or_else(Floors::default, |nominal| Floors {
+/// A robot with what its recording declares.
+pub(crate) fn member(recording: &Recording, robot: RobotId, model: &RobotModel<f64>) -> Member {
+    let floors = recording.nominal.as_ref().map_or_else(Floors::default, |nominal| Floors {
         lateral_slip_s: nominal.noise.odometry_floor_lateral_slip_s,
         sensor_lag_s: nominal.noise.gyro_floor_lag_s,
         command_lag_s: nominal.noise.command_floor_lag_s,
         servo_time_constant_s: model.nominal.servo_time_constant_s,
     });
-    let jitter_s = own.recording.nominal.as_ref().map_or(0.0, |nominal| nominal.noise.command_jitter_s);
-    Unit::new(&own.evidence, index, robot, model.clone(), floors, jitter_s * UNIFORM_SIGMA)
+    let jitter_s = recording.nominal.as_ref().map_or(0.0, |nominal| nominal.noise.command_jitter_s);
+    Member { robot, nominal: model.clone(), floors, jitter_sigma_s: jitter_s * UNIFORM_SIGMA }
 }
 
 /// What could not be compared at all.
@@ -195,11 +225,11 @@ fn notes(prepared: &[Prepared<'_>], units: &[Unit<'_>], fitted: &[&Unit<'_>]) ->
         for stretch in &unit.stretches {
             let few = stretch.rows / FEW;
             for omission in stretch.omissions.iter().filter(|omission| omission.matters(few)) {
-                notes.push(format!("{name}, robot {}, {}: {omission}", unit.robot, stretch.channel));
+                notes.push(format!("{name}, robot {}, {}: {omission}", unit.robot(), stretch.channel));
             }
         }
     }
-    let mut robots: Vec<RobotId> = fitted.iter().map(|unit| unit.robot).collect();
+    let mut robots: Vec<RobotId> = fitted.iter().map(|unit| unit.robot()).collect();
     robots.sort_unstable();
     robots.dedup();
     for (robot, lasting_s) in robots.into_iter().map(|robot| (robot, lasting_s(fitted, robot))) {
@@ -243,7 +273,7 @@ fn judgements(
 
 /// The gain on recordings that were not fitted on.
 fn on_tests(tests: &[&Unit<'_>], term: &Term, support: &Support) -> Gain {
-    let acting: Vec<&Unit<'_>> = tests.iter().copied().filter(|unit| term.acts_on(unit.robot)).collect();
+    let acting: Vec<&Unit<'_>> = tests.iter().copied().filter(|unit| unit.has(term)).collect();
     let at = |fit: &Fit| -> Option<Vec<State>> { states(&acting, &fit.terms) };
     match (at(&support.with), at(&support.without)) {
         (Some(with), Some(without)) => compared(&acting, &with, &without),
@@ -277,7 +307,9 @@ pub(crate) fn nuisance(term: &Term) -> String {
 
 fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgement) -> Finding {
     let info = own.judged.estimated[0].term.effect.info();
-    let robots: BTreeSet<u32> = own.support.units.iter().map(|&unit| units[unit].robot.0).collect();
+    let term = &own.judged.estimated[0].term;
+    let acted_on = own.support.units.iter().flat_map(|&unit| units[unit].acted_on(term));
+    let robots: BTreeSet<u32> = acted_on.map(|member| member.robot.0).collect();
     let robots: Vec<u32> = robots.into_iter().collect();
     let mut support_set: Vec<String> =
         own.support.members.iter().map(|effect| effect.name().to_owned()).collect();

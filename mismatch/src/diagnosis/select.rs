@@ -51,9 +51,9 @@ pub(crate) struct Selected {
     pub(crate) pool: Pool,
 }
 
-/// Adds effects from `entries` as long as one is significant; prunes.
-pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry]) -> Option<Selected> {
-    let mut current = fit(units, Vec::new(), &|_| true, Effort::FULL)?;
+/// Adds effects from `entries` to terms as long as one is significant; prunes.
+pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry], terms: Vec<Term>) -> Option<Selected> {
+    let mut current = fit(units, terms, &|_| true, Effort::FULL)?;
     let mut pool = Pool::default();
     let mut tests = 0;
     for _ in 0..MOST_ROUNDS {
@@ -69,9 +69,19 @@ pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry]) -> Option<Selected>
             pool = Pool::default();
             continue;
         }
-        for fit in added {
+        for fit in &added {
             pool.forget(fit.terms.last()?);
-            current = joined(units, &current, &fit)?;
+        }
+        if units.iter().all(|unit| unit.mesh.is_none()) {
+            for fit in added {
+                current = joined(units, &current, &fit)?;
+            }
+        } else {
+            // Terms of one robot show in what others see of it: all are fitted together, and the noise anew.
+            let mut terms = current.terms;
+            terms.extend(added.into_iter().filter_map(|fit| fit.terms.last().cloned()));
+            let joined = fit(units, terms, &|_| true, Effort::RIVAL)?;
+            current = fit(units, joined.terms, &|_| true, Effort::RIVAL)?;
         }
     }
     let current = fit(units, current.terms, &|_| true, Effort::FULL)?;
@@ -289,7 +299,7 @@ fn joined(units: &[&Unit<'_>], whole: &Fit, part: &Fit) -> Option<Fit> {
     for (index, unit) in units.iter().enumerate() {
         let mut own = whole.columns[index].clone();
         own.resize(slots.len(), Column::empty(unit));
-        if added.acts_on(unit.robot) {
+        if unit.has(added) {
             let (state, fitted) = mine.next()?;
             for (slot, column) in part.slots.iter().zip(fitted) {
                 let position = slots.iter().position(|known| *known == placed(slot))?;
@@ -307,11 +317,11 @@ fn joined(units: &[&Unit<'_>], whole: &Fit, part: &Fit) -> Option<Fit> {
 
 /// Fits a term beside those of a fit; of the units, those that it acts on.
 pub(crate) fn fit_beside(units: &[&Unit<'_>], current: &Fit, term: Term) -> Option<Fit> {
-    let own: Vec<usize> = (0..units.len()).filter(|&unit| term.acts_on(units[unit].robot)).collect();
+    let own: Vec<usize> = (0..units.len()).filter(|&unit| units[unit].has(&term)).collect();
     let acting: Vec<&Unit<'_>> = own.iter().map(|&unit| units[unit]).collect();
     let whose = term.whose;
     let mut terms: Vec<Term> =
-        current.terms.iter().filter(|known| overlap(known.whose, whose)).cloned().collect();
+        current.terms.iter().filter(|known| acting.iter().any(|unit| unit.has(known))).cloned().collect();
     terms.push(term);
     // What other robots share stays where it is.
     let movable: Vec<bool> =
@@ -349,7 +359,7 @@ fn criterion(units: &[&Unit<'_>], current: &Fit, added: &Fit, inflation: f64) ->
 fn gained(units: &[&Unit<'_>], current: &Fit, added: &Fit) -> (usize, f64) {
     let Some(term) = added.terms.last() else { return (0, 0.0) };
     let (mut rows, mut before) = (0, 0.0);
-    for (unit, state) in units.iter().zip(&current.states).filter(|(unit, _)| term.acts_on(unit.robot)) {
+    for (unit, state) in units.iter().zip(&current.states).filter(|(unit, _)| unit.has(term)) {
         rows += unit.rows.len();
         before += state.noise.log_likelihood;
     }

@@ -26,7 +26,7 @@ pub(crate) fn plots(
                 let indices = || stretch.range().skip(component).step_by(stretch.components);
                 plots.residuals.push(ResidualSeries {
                     recording: prepared[unit.recording].recording.name.clone(),
-                    robot: unit.robot.0,
+                    robot: unit.members[stretch.member].robot.0,
                     channel: stretch.channel,
                     component,
                     time_s: indices().map(|index| unit.rows[index].time_s).collect(),
@@ -92,7 +92,7 @@ fn partial(
         all.push(PartialResidual {
             finding,
             recording: recording.to_owned(),
-            robot: unit.robot.0,
+            robot: unit.members[stretch.member].robot.0,
             channel: stretch.channel,
             component,
             time_s: indices().map(|index| unit.rows[index].time_s).collect(),
@@ -113,8 +113,9 @@ fn gain(
     order.sort_by(|&a, &b| unit.rows[a].time_s.total_cmp(&unit.rows[b].time_s));
     let mut all: Vec<[f64; 2]> = Vec::new();
     let mut sum = 0.0;
+    let gains = held_out::gains(unit, with, without);
     for index in order {
-        sum += held_out::gain(with, without, index);
+        sum += gains[index];
         let time_s = unit.rows[index].time_s;
         match all.last_mut() {
             Some(last) if time_s - last[0] < GAIN_STEP_S => last[1] = sum,

@@ -7,18 +7,23 @@ use pleiad_physics::Effect;
 
 use crate::diagnosis::candidate::Candidate;
 use crate::diagnosis::chi_square::upper_tail;
-use crate::diagnosis::fit::{Effort, Fit, Slot, fit};
+use crate::diagnosis::fit::{Effort, Fit, Normal, Slot, columns, fit, fit_at};
 use crate::diagnosis::naming::{Estimated, is_unseen, twin};
 use crate::diagnosis::profile::{is_on, polish_some};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::select::{Pool, Scored, covariance, fit_beside, overlap, score, whites};
-use crate::diagnosis::term::Term;
+use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{White, step};
+use crate::diagnosis::without_truth::at_own_references;
 use crate::parallel;
 
 /// A rival explains the data about equally if it loses less than this, twice in log-likelihood: odds of 20.
 pub(crate) const ODDS: f64 = 5.991_464_547_107_98;
+/// Errors of the nominal geometry that every robot has a little of.
+const NOMINAL: [Effect; 3] = [Effect::WheelRadiusError, Effect::TrackWidthError, Effect::UnequalWheelRadii];
+/// A rival that loses more than this is none at its own references either.
+const FAR: f64 = 60.0;
 /// So many rivals are fitted.
 const RIVALS: usize = 8;
 /// A rival that gains less than this share by linearization does not explain it.
@@ -57,17 +62,18 @@ pub(crate) fn support(
     tests: usize,
 ) -> Option<Support> {
     let chosen = &full.terms[*group.first()?];
-    let own_units: Vec<usize> = (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
+    let own_units: Vec<usize> = (0..units.len()).filter(|&unit| units[unit].has(chosen)).collect();
     let acting: Vec<&Unit<'_>> = own_units.iter().map(|&unit| units[unit]).collect();
     let others: Vec<Term> = full
         .terms
         .iter()
         .enumerate()
-        .filter(|(index, other)| !group.contains(index) && overlap(other.whose, chosen.whose))
+        .filter(|(index, other)| !group.contains(index) && acting.iter().any(|unit| unit.has(other)))
         .map(|(_, other)| other.clone())
         .collect();
     // What other robots share with this one stays where it is.
-    let movable: Vec<bool> = others.iter().map(|other| other.whose == chosen.whose).collect();
+    let meshed = acting.iter().any(|unit| unit.mesh.is_some());
+    let movable: Vec<bool> = others.iter().map(|other| meshed || other.whose == chosen.whose).collect();
     let count = others.len();
     let with = {
         let mut terms = others.clone();
@@ -86,7 +92,7 @@ pub(crate) fn support(
     if !relevant {
         return None;
     }
-    let without = fit(&acting, others, &|index| movable[index], Effort::RIVAL)?;
+    let without = fit_at(&acting, others, &with.states, &|index| movable[index], Effort::RIVAL)?;
     let whites = whites(&acting, &without);
     let own = Own::of(&whites, &with, &without, count);
     let significant = upper_tail(own.ratio(&with, &without), own.parameters()) * tests as f64 <= HOPELESS;
@@ -104,12 +110,22 @@ pub(crate) fn support(
     } else {
         Vec::new()
     };
+    let own_reference = if meshed && !rivals.is_empty() {
+        at_own_references(&acting, &with, &with.states).map(|own| own + slack(&acting, &with))
+    } else {
+        None
+    };
     let fitted = parallel::map(&rivals, |rival| {
         let rival = refine(&acting, &whites, rival);
         let fit = fit_beside(&acting, &without, rival.term())?;
         let lost = |to: &Fit| 2.0 * (to.log_likelihood - fit.log_likelihood) / inflation;
+        let mut less = lost(&with);
+        if meshed && less > ODDS && less < FAR {
+            let own = at_own_references(&acting, &fit, &with.states)? + slack(&acting, &fit);
+            less = 2.0 * (own_reference? - own) / inflation;
+        }
         // A rival of more parameters that does no better is the finding in disguise.
-        if lost(&with) > ODDS || fit.slots.len() > with.slots.len() {
+        if less > ODDS || slots_of(&fit, fit.terms.len() - 1) > slots_of(&with, count) {
             return None;
         }
         // It has to explain the same: beside a rival the finding is not needed. Another effect that also
@@ -118,7 +134,11 @@ pub(crate) fn support(
         for &term in group {
             both = fit_beside(&acting, &both, full.terms[term].clone())?;
         }
-        (lost(&both) < ODDS).then_some(rival.candidate.term.effect)
+        let mut needed = lost(&both);
+        if meshed && needed > ODDS && needed < FAR {
+            needed += 2.0 * (slack(&acting, &both) - slack(&acting, &fit)) / inflation;
+        }
+        (needed < ODDS).then_some(rival.candidate.term.effect)
     });
     let mut members: Vec<Effect> = group.iter().map(|&term| full.terms[term].effect).collect();
     members.extend(fitted.into_iter().flatten());
@@ -126,6 +146,39 @@ pub(crate) fn support(
         members.extend(twin(chosen.effect).filter(|twin| !members.contains(twin)));
     }
     Some(Support { units: own_units, without, with, group: positions, covariance, members, inflation })
+}
+
+/// What a fit could still gain in log-likelihood by errors of the nominal geometry that are too small to matter: each
+/// as unsure as it is relevant. Two effects between which only those decide are the same.
+fn slack(units: &[&Unit<'_>], fit: &Fit) -> f64 {
+    let mut terms = fit.terms.clone();
+    let mut floors = Vec::new();
+    for member in units.iter().flat_map(|unit| &unit.members) {
+        for effect in NOMINAL {
+            let whose = Whose::Robot(member.robot);
+            let off = effect.info().parameters.iter().map(|parameter| parameter.off).collect();
+            let term = Term::new(effect, whose, off);
+            if fit.terms.iter().any(|own| own.effect == effect && overlap(own.whose, whose)) {
+                continue;
+            }
+            floors.push(term.parameters()[0].relevance.threshold(&member.floors));
+            terms.push(term);
+        }
+    }
+    let added: Vec<Slot> = (0..floors.len()).map(|index| (fit.terms.len() + index, 0)).collect();
+    let slots: Vec<Slot> = fit.slots.iter().copied().chain(added).collect();
+    let columns: Vec<Vec<Column>> = units.iter().map(|unit| columns(unit, &terms, &slots)).collect();
+    let mut normal = Normal::new(units, &fit.states, &columns, slots.len());
+    for (index, floor) in floors.iter().enumerate() {
+        let slot = fit.slots.len() + index;
+        normal.information[(slot, slot)] += 1.0 / (floor * floor);
+    }
+    normal.step(1e-9).map_or(0.0, |step| 0.5 * step.dot(&normal.gradient).max(0.0))
+}
+
+/// How many parameters of the terms from a position on are fitted.
+fn slots_of(fit: &Fit, first: usize) -> usize {
+    fit.slots.iter().filter(|(term, _)| *term >= first).count()
 }
 
 /// What a finding gains beside everything but itself, by linearization.
@@ -203,9 +256,10 @@ fn rivals(units: &[&Unit<'_>], full: &Fit, chosen: &Term, pool: &Pool) -> Vec<Ca
         full.terms.iter().any(|term| term.effect == rival.effect && overlap(term.whose, rival.whose))
     };
     let same = |rival: &Term| {
-        units.iter().all(|unit| rival.acts_on(unit.robot) == chosen.acts_on(unit.robot)) && !known(rival)
+        let members = || units.iter().flat_map(|unit| &unit.members);
+        members().all(|member| rival.acts_on(member.robot) == chosen.acts_on(member.robot)) && !known(rival)
     };
-    let own: Vec<usize> = (0..units.len()).filter(|&unit| chosen.acts_on(units[unit].robot)).collect();
+    let own: Vec<usize> = (0..units.len()).filter(|&unit| units[unit].has(chosen)).collect();
     pool.candidates()
         .filter(|candidate| same(&candidate.term))
         .map(|candidate| candidate.renumbered(&own))

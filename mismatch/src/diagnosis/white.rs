@@ -7,8 +7,8 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::diagnosis::fit::State;
-use crate::diagnosis::noise;
-use crate::diagnosis::unit::{Column, Stretch, Unit};
+use crate::diagnosis::noise::{self, Noise};
+use crate::diagnosis::unit::{Column, Unit};
 
 /// The least variance of a score, as a share of that of independent errors.
 const LEAST_SHARE: f64 = 0.5;
@@ -18,21 +18,23 @@ pub(crate) struct White<'u, 'a> {
     pub(crate) unit: &'u Unit<'a>,
     /// Residuals in sigmas, times the root of their weight.
     pub(crate) errors: Vec<f64>,
-    /// What residuals and columns are multiplied by: the root of the weight over sigma. Both alike, so that an
-    /// effect far above the noise is seen at its size; what it does not explain pulls no more than it may.
+    noise: &'u Noise,
+    /// What residuals and columns in sigmas are multiplied by: the root of the weight. Both alike, so that an effect
+    /// far above the noise is seen at its size; what it does not explain pulls no more than it may.
     factors: Vec<f64>,
     /// What the model's parameters predict, per parameter: minus the derivative of the residual.
     active: Vec<Vec<Option<Vec<f64>>>>,
 }
 
 impl<'u, 'a> White<'u, 'a> {
-    pub(crate) fn new(unit: &'u Unit<'a>, state: &State, columns: &[Column]) -> Self {
-        let factor = |(residual, sigma): (&f64, &f64)| noise::weight(residual / sigma).sqrt() / sigma;
-        let factors: Vec<f64> = state.residuals.iter().zip(&state.noise.sigma).map(factor).collect();
-        let errors =
-            state.residuals.iter().zip(&factors).map(|(residual, factor)| residual * factor).collect();
-        let mut white = Self { unit, errors, factors, active: Vec::new() };
-        white.active = columns.iter().map(|column| white.of(column)).collect();
+    pub(crate) fn new(unit: &'u Unit<'a>, state: &'u State, columns: &[Column]) -> Self {
+        let mut errors = state.noise.whitened(unit, &state.residuals);
+        let factors: Vec<f64> = errors.iter().map(|error| noise::weight(*error).sqrt()).collect();
+        for (error, factor) in errors.iter_mut().zip(&factors) {
+            *error *= factor;
+        }
+        let mut white = Self { unit, errors, noise: &state.noise, factors, active: Vec::new() };
+        white.active = white.all_of(columns);
         white
     }
 
@@ -44,14 +46,16 @@ impl<'u, 'a> White<'u, 'a> {
             .filter_map(move |(slot, column)| Some((slot, column[which].as_deref()?)))
     }
 
-    /// A column in sigmas, per stretch.
-    fn of(&self, column: &Column) -> Vec<Option<Vec<f64>>> {
-        let part = |(part, stretch): (&Option<Vec<f64>>, &Stretch)| {
-            let factors = &self.factors[stretch.range()];
-            part.as_ref()
-                .map(|part| part.iter().zip(factors).map(|(value, factor)| -value * factor).collect())
-        };
-        column.parts.iter().zip(&self.unit.stretches).map(part).collect()
+    /// What columns predict, in sigmas, per stretch.
+    fn all_of(&self, columns: &[Column]) -> Vec<Vec<Option<Vec<f64>>>> {
+        let mut all = self.noise.whitened_columns(self.unit, columns);
+        for (stretch, part) in all.iter_mut().flat_map(|parts| self.unit.stretches.iter().zip(parts)) {
+            let Some(part) = part else { continue };
+            for (value, factor) in part.iter_mut().zip(&self.factors[stretch.range()]) {
+                *value *= -factor;
+            }
+        }
+        all
     }
 }
 
@@ -80,11 +84,8 @@ pub(crate) fn step(whites: &[&White<'_, '_>], columns: &[&[Column]]) -> Option<S
         return None;
     }
     let active = whites.first()?.active.len();
-    let own: Vec<Vec<Vec<Option<Vec<f64>>>>> = whites
-        .iter()
-        .zip(columns)
-        .map(|(white, columns)| columns.iter().map(|column| white.of(column)).collect())
-        .collect();
+    let own: Vec<Vec<Vec<Option<Vec<f64>>>>> =
+        whites.iter().zip(columns).map(|(white, columns)| white.all_of(columns)).collect();
     // Gram matrices over the stretches that the columns show in.
     let mut both = DMatrix::zeros(size, active);
     let mut within = DMatrix::zeros(size, size);
@@ -219,7 +220,7 @@ fn ridge(mut matrix: DMatrix<f64>) -> Option<nalgebra::Cholesky<f64, nalgebra::D
     matrix.cholesky()
 }
 
-fn symmetric(matrix: &mut DMatrix<f64>) {
+pub(crate) fn symmetric(matrix: &mut DMatrix<f64>) {
     for row in 0..matrix.nrows() {
         for column in row + 1..matrix.ncols() {
             matrix[(row, column)] = matrix[(column, row)];
@@ -227,7 +228,7 @@ fn symmetric(matrix: &mut DMatrix<f64>) {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four sums at a time, always in this order: one sum would wait for itself.
     let (fours, rest) = a.as_chunks::<4>();
     let (other_fours, other_rest) = b.as_chunks::<4>();

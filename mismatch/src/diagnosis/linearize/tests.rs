@@ -2,12 +2,13 @@ use std::collections::BTreeMap;
 
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
 use pleiad_estimation::{LandmarkId, Pose2, RobotId, Timestamp};
-use pleiad_physics::{Drive, Effect, Floors, Nominal, Pose, RobotModel};
+use pleiad_physics::{Drive, Effect, Nominal, Pose, RobotModel};
 use pleiad_recording::{Command, Recording, TruthSample};
 
 use super::*;
 use crate::diagnosis::entries::entries;
 use crate::diagnosis::fit::states;
+use crate::diagnosis::run::member;
 use crate::diagnosis::starts::{Placing, starts};
 use crate::diagnosis::term::Whose;
 use crate::evidence::Evidence;
@@ -78,8 +79,7 @@ fn what_is_linearized_together_is_what_each_has_alone() {
     let model: RobotModel<f64> = RobotModel::nominal(Drive::Differential, Nominal::ideal(0.05, 0.4));
     let models: BTreeMap<_, _> = recording.robots.keys().map(|robot| (*robot, model.clone())).collect();
     let evidence = Evidence::new(&recording, &models);
-    let units =
-        [1, 2].map(|robot| Unit::new(&evidence, 0, RobotId(robot), model.clone(), Floors::default(), 0.0));
+    let units = [1, 2].map(|robot| Unit::new(&evidence, 0, vec![member(&recording, RobotId(robot), &model)]));
     let units: Vec<&Unit<'_>> = units.iter().collect();
     let terms = [Term::new(Effect::WheelRadiusError, Whose::Robot(RobotId(1)), vec![0.01])];
     let states = states(&units, &terms).expect("finite");

@@ -117,7 +117,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
     let mut places = Vec::new();
     for (position, unit) in units.iter().enumerate() {
         let model = unit.model(&fit.terms);
-        let values = unit.values(&model, &|channel| channel == Channel::Actuator);
+        let values = unit.values(&fit.terms, &|channel| channel == Channel::Actuator);
         let Some(values) = values.into_iter().flatten().next() else { continue };
         collect(position, unit, &model, &values, &mut rows, &mut places);
     }
@@ -200,7 +200,7 @@ fn collect(
     rows: &mut Vec<Row>,
     places: &mut Vec<Place>,
 ) {
-    let Some((track, plans)) = unit.evidence.prepared(unit.robot) else { return };
+    let Some((track, plans)) = unit.evidence.prepared(unit.robot()) else { return };
     let measured: Vec<_> = plans.actuator.items.iter().filter(|item| item.measured.is_some()).collect();
     if measured.len() * 2 != values.len() {
         return;
@@ -264,12 +264,12 @@ fn servo(model: &RobotModel<f64>) -> ([f64; 2], f64) {
 }
 
 fn changes(unit: &Unit<'_>, track: &Track, model: &RobotModel<f64>, latency_s: f64) -> Vec<Change> {
-    let recorded = unit.evidence.robot(unit.robot).map_or(&[][..], |(recording, _)| &recording.commands);
+    let recorded = unit.evidence.robot(unit.robot()).map_or(&[][..], |(recording, _)| &recording.commands);
     let stamps: Vec<f64> = recorded.iter().map(|command| unit.evidence.seconds(command.time)).collect();
     let targets = |model: &RobotModel<f64>| -> Vec<[f64; 2]> {
         track.commands.iter().map(|command| target(track, model, command, latency_s)).collect()
     };
-    let (targets, plain) = (targets(model), targets(&unit.nominal));
+    let (targets, plain) = (targets(model), targets(unit.nominal()));
     let change = |index: usize| {
         let time_s = track.commands[index].time_s;
         let next = stamps.partition_point(|stamp_s| *stamp_s <= time_s);
@@ -324,10 +324,9 @@ pub(super) fn explained(family: &Family<'_, '_>, shows: &Shows, by: Effect, fit:
     let variance = |index: usize| shows.known.between(index, index).unwrap_or(0.0);
     let half_error_s = if half_s > 0.0 { 0.25 * variance(JITTER).sqrt() / jitter_s } else { 0.0 };
     let error_s = variance(DELAY).sqrt().hypot(half_error_s);
-    let own = |term: &Term| {
-        term.effect == Effect::CommandDelay && family.units.iter().all(|unit| term.acts_on(unit.robot))
-    };
-    let floors = family.units.first().map(|unit| unit.floors).unwrap_or_default();
+    let own =
+        |term: &Term| term.effect == Effect::CommandDelay && family.units.iter().all(|unit| unit.has(term));
+    let floors = family.units.first().map(|unit| unit.members[0].floors).unwrap_or_default();
     let judged = |(position, term): (usize, &Term)| {
         let left_s = term.values[0] + parameters[DELAY] - half_s;
         let threshold_s = term.parameters()[0].relevance.threshold(&floors);

@@ -86,7 +86,7 @@ fn is_relevant(
         || family.units.iter().any(|unit| {
             let parameters = estimated.term.parameters().iter().enumerate();
             parameters.filter(|(index, _)| tested(&member.shown[*index])).any(|(index, parameter)| {
-                let threshold = parameter.relevance.threshold(&unit.floors);
+                let threshold = parameter.relevance.threshold(&unit.members[0].floors);
                 let size = (estimated.term.values[index] - parameter.off).abs();
                 // Of a probability the logarithm is nearer to a normal distribution.
                 let near = |error: f64| match member.shown[index] {
@@ -130,7 +130,7 @@ pub(super) fn undetected(
             let threshold = family
                 .units
                 .iter()
-                .map(|unit| parameter.relevance.threshold(&unit.floors))
+                .map(|unit| parameter.relevance.threshold(&unit.members[0].floors))
                 .fold(0.0, f64::max);
             // Each size for itself, the effect's other parameters off.
             let error = |index: usize| known.as_ref()?.alone(&member.parameters, index);

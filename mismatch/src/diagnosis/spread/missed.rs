@@ -144,14 +144,14 @@ fn collect(
     places: &mut Vec<Place>,
 ) {
     let own = scans(unit, kind);
-    let Some((_, track)) = unit.evidence.robot(unit.robot) else { return };
+    let Some((_, track)) = unit.evidence.robot(unit.robot()) else { return };
     if own.is_empty() {
         return;
     }
     let sigmas = spreads(unit, model, kind, &own);
     let margins = sigmas.map(|sigma| MARGIN_SIGMAS * sigma);
     for (time_s, scan) in instants(unit, &own) {
-        let Some(at) = At::new(unit.evidence, unit.robot, track, time_s) else { continue };
+        let Some(at) = At::new(unit.evidence, unit.robot(), track, time_s) else { continue };
         let targets = targets(unit, kind, time_s);
         let near = |reading: &Reading<'_>, seen: &Seen| {
             let (errors, _) = reading.errors(unit, model, seen);
@@ -205,7 +205,8 @@ fn instants<'s, 'a>(unit: &Unit<'_>, own: &'s [Scan<'a>]) -> Vec<(f64, Option<&'
         (0..Channel::SIGHTINGS.len()).flat_map(|kind| scans(unit, kind)).map(|scan| scan.time_s).collect();
     stamps.sort_by(f64::total_cmp);
     stamps.dedup();
-    let rates = unit.evidence.recording.nominal.as_ref().and_then(|nominal| nominal.robots.get(&unit.robot));
+    let rates =
+        unit.evidence.recording.nominal.as_ref().and_then(|nominal| nominal.robots.get(&unit.robot()));
     let rate_hz = rates.and_then(|robot| robot.rates_hz.get("relative_rate_hz")).copied();
     let period_s = rate_hz
         .filter(|rate_hz| *rate_hz > 0.0)

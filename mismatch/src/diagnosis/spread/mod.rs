@@ -72,11 +72,11 @@ pub(crate) fn take(entries: &mut Entries, units: &[&Unit<'_>]) -> Vec<Entry> {
 }
 
 fn robots(units: &[&Unit<'_>]) -> BTreeSet<RobotId> {
-    units.iter().map(|unit| unit.robot).collect()
+    units.iter().map(|unit| unit.robot()).collect()
 }
 
 fn of_robot<'u, 'a>(units: &[&'u Unit<'a>], robot: RobotId) -> Vec<&'u Unit<'a>> {
-    units.iter().copied().filter(|unit| unit.robot == robot).collect()
+    units.iter().copied().filter(|unit| unit.robot() == robot).collect()
 }
 
 /// An effect of spread that some robots show.

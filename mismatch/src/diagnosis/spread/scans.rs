@@ -43,7 +43,7 @@ pub(super) fn predicted(
     at: &At,
     seen: &Seen,
 ) -> signal::Sighting<f64> {
-    let track = &unit.evidence.tracks[&unit.robot];
+    let track = &unit.evidence.tracks[&unit.robot()];
     sightings::predicted(unit.evidence, (track, at), seen, model)
 }
 
@@ -55,7 +55,7 @@ pub(super) struct Scan<'s> {
 
 /// The sightings of landmarks (kind 0) or robots (kind 1) that could be placed, by instant.
 pub(super) fn scans<'s>(unit: &'s Unit<'_>, kind: usize) -> Vec<Scan<'s>> {
-    let Some((_, plans)) = unit.evidence.prepared(unit.robot) else { return Vec::new() };
+    let Some((_, plans)) = unit.evidence.prepared(unit.robot()) else { return Vec::new() };
     let [ranges, bearings] =
         Channel::SIGHTINGS[kind].map(|channel| plans.of_sightings(channel).items.as_slice());
     let mut found: Vec<Scan<'s>> = Vec::new();
@@ -78,7 +78,7 @@ pub(super) fn targets(unit: &Unit<'_>, kind: usize, time_s: f64) -> Vec<(Target,
             |(&id, place): (&LandmarkId, &[f64; 2])| (Target::Landmark(id), Seen::landmark(id.0, *place));
         return evidence.recording.landmarks.iter().map(landmark).collect();
     }
-    let others = evidence.tracks.keys().filter(|robot| **robot != unit.robot);
+    let others = evidence.tracks.keys().filter(|robot| **robot != unit.robot());
     others
         .filter_map(|&robot| Some((Target::Robot(robot), seen(evidence, Target::Robot(robot), time_s).ok()?)))
         .collect()

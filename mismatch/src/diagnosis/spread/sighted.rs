@@ -264,7 +264,7 @@ fn range_noise(units: &[&Unit<'_>], rows: &[Row], known: &[usize]) -> Option<Mem
     let (near, far) = (share(10)?, share(90)?);
     let often = |kind: usize| rows.iter().filter(|row| row.kind == kind).count();
     let kind = usize::from(!known.contains(&0) || (known.contains(&2) && often(1) > often(0)));
-    let declared = units.first().map_or(0.0, |unit| unit.nominal.nominal.range_sigma_m);
+    let declared = units.first().map_or(0.0, |unit| unit.nominal().nominal.range_sigma_m);
     let constant = if declared > 0.0 { Shown::ExpLess(2 * kind, declared) } else { Shown::Fixed(0.0) };
     let threshold = Effect::RangeDependentNoise.info().parameters[1].relevance;
     let threshold = threshold.threshold(&Floors::default());

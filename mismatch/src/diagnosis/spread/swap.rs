@@ -55,12 +55,12 @@ pub(crate) struct Swaps {
 /// Finds the swaps of every robot and gives them to its units' models.
 pub(crate) fn swaps(units: &mut [Unit<'_>]) -> Swaps {
     let mut all = Swaps::default();
-    let mut robots: Vec<RobotId> = units.iter().map(|unit| unit.robot).collect();
+    let mut robots: Vec<RobotId> = units.iter().map(|unit| unit.robot()).collect();
     robots.sort_unstable();
     robots.dedup();
     let mut of_robots: BTreeMap<RobotId, Gains> = BTreeMap::new();
     for robot in robots {
-        let own: Vec<&Unit<'_>> = units.iter().filter(|unit| unit.robot == robot).collect();
+        let own: Vec<&Unit<'_>> = units.iter().filter(|unit| unit.robot() == robot).collect();
         let gains = gains(&own);
         if gains.is_empty() {
             continue;
@@ -101,8 +101,8 @@ pub(crate) fn swaps(units: &mut [Unit<'_>]) -> Swaps {
     }
     all.found.extend(halves(&all.found, &of_robots));
     for swap in &all.found {
-        for unit in units.iter_mut().filter(|unit| unit.robot == swap.robot) {
-            unit.nominal.effects.push(effect(swap.pair));
+        for unit in units.iter_mut().filter(|unit| unit.robot() == swap.robot) {
+            unit.members[0].nominal.effects.push(effect(swap.pair));
         }
     }
     all
@@ -204,7 +204,7 @@ fn gains(units: &[&Unit<'_>]) -> Gains {
     let mut gains = Gains::new();
     let blank: Vec<Vec<f64>> = units.iter().map(|unit| vec![0.0; unit.blocks + 1]).collect();
     for (position, unit) in units.iter().enumerate() {
-        let model = &unit.nominal;
+        let model = unit.nominal();
         let declared = [model.nominal.range_sigma_m, model.nominal.bearing_sigma_rad];
         let sigmas = [0, 1]
             .map(|part: usize| SLACK * if declared[part] > 0.0 { declared[part] } else { UNDECLARED[part] });

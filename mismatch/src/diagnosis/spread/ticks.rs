@@ -44,7 +44,7 @@ pub(super) fn coarse(units: &[&Unit<'_>], robot: RobotId, tests: usize) -> Optio
     let changes = changes(units);
     let tick_rad = tick(&changes)?;
     let ticks = std::f64::consts::TAU / tick_rad;
-    let declared = units.first()?.nominal.nominal.encoder_ticks_per_rev;
+    let declared = units.first()?.nominal().nominal.encoder_ticks_per_rev;
     let limit = if declared > 0.0 { COARSE * declared } else { UNDECLARED };
     let finer = if declared > 0.0 { declared } else { UNDECLARED };
     if ticks >= limit {
@@ -96,14 +96,14 @@ pub(super) fn coarse(units: &[&Unit<'_>], robot: RobotId, tests: usize) -> Optio
 /// Whether a robot recorded angles of its wheels.
 pub(super) fn recorded(units: &[&Unit<'_>]) -> bool {
     units.iter().any(|unit| {
-        unit.evidence.robot(unit.robot).is_some_and(|(_, track)| track.wheels_missing().is_none())
+        unit.evidence.robot(unit.robot()).is_some_and(|(_, track)| track.wheels_missing().is_none())
     })
 }
 
 fn changes(units: &[&Unit<'_>]) -> Vec<Change> {
     let mut all = Vec::new();
     for (position, unit) in units.iter().enumerate() {
-        let Some((_, track)) = unit.evidence.robot(unit.robot) else { continue };
+        let Some((_, track)) = unit.evidence.robot(unit.robot()) else { continue };
         for pair in track.encoders.windows(2) {
             for wheel in 0..2 {
                 let by_rad = pair[1].angle_rad[wheel] - pair[0].angle_rad[wheel];

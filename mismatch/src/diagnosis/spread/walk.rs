@@ -102,7 +102,7 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
     let mut places = Vec::new();
     for (position, unit) in units.iter().enumerate() {
         let Some(stretch) = unit.stretch(Channel::Gyro) else { continue };
-        let values = unit.values(&unit.model(&terms), &|channel| channel == Channel::Gyro);
+        let values = unit.values(&terms, &|channel| channel == Channel::Gyro);
         let Some(values) = values.into_iter().flatten().next() else { continue };
         let mut before: Option<f64> = None;
         for (index, residual) in stretch.range().zip(values) {
@@ -179,14 +179,14 @@ pub(super) fn explained(family: &Family<'_, '_>, walk: &Shows, fit: &Fit) -> Vec
     let known = uncertainty(family.density.as_ref(), &family.bounds, &with, &free);
     let first = Contrast { weights: vec![(FIRST, 1.0)], threshold: 0.0 };
     let threshold = |term: &Term| {
-        let floors = family.units.first().map(|unit| unit.floors).unwrap_or_default();
+        let floors = family.units.first().map(|unit| unit.members[0].floors).unwrap_or_default();
         term.parameters()[0].relevance.threshold(&floors)
     };
     let starts_off = |term: &Term| {
         let beyond = |(size, error): (f64, f64)| size - NEAR_END * error > threshold(term);
         known.as_ref().and_then(|known| first.estimate(&with.parameters, known)).is_some_and(beyond)
     };
-    let own = |term: &Term| is_bias(term) && family.units.iter().all(|unit| term.acts_on(unit.robot));
+    let own = |term: &Term| is_bias(term) && family.units.iter().all(|unit| unit.has(term));
     let terms = fit.terms.iter().enumerate().filter(|(_, term)| own(term));
     terms
         .filter(|(_, term)| term.effect == Effect::GyroThermalDrift || !starts_off(term))

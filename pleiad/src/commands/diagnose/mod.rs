@@ -11,7 +11,7 @@ mod summary;
 
 use std::path::Path;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use pleiad_mismatch::{DiagnoseOptions, TruthUse, diagnose};
 use pleiad_recording::{Nominal, ReadOptions, Recording, read_model};
 use pleiad_report::{diagnose_report, write_summary};
@@ -20,12 +20,6 @@ use crate::cli::{DiagnoseArgs, TruthArg};
 use crate::{folder, output, setup};
 
 pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
-    if args.truth == TruthArg::No {
-        bail!(
-            "--truth no: diagnosis without ground truth is not built yet; leave the option out, and what needs \
-             ground truth that was not recorded is told as untestable"
-        );
-    }
     let mut chosen = choice::choose(args)?;
     let model = args.model.as_deref().map(model).transpose()?;
     let spinner = output::spinner("reading");
@@ -37,7 +31,16 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
     // A folder that cannot be written to is told before the work, a new one is made after it.
     let asked = args.out.as_deref().map(|out| folder::create(Some(out), "")).transpose()?;
     spinner.set_message("diagnosing");
-    let options = DiagnoseOptions { fit_on: chosen.fit_on, test_on: chosen.test_on, truth: TruthUse::Auto };
+    let truth = match args.truth {
+        TruthArg::Auto => TruthUse::Auto,
+        TruthArg::No => TruthUse::No,
+    };
+    let options = DiagnoseOptions {
+        fit_on: chosen.fit_on,
+        test_on: chosen.test_on,
+        truth,
+        without_landmarks: args.without_landmarks,
+    };
     let mut diagnosis = diagnose(&recordings, &options)?;
     diagnosis.findings.notes.extend(chosen.notes);
     sentences::fill_summaries(&mut diagnosis.findings);
