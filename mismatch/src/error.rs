@@ -36,6 +36,14 @@ pub enum MismatchError {
         /// The names there are.
         given: Vec<String>,
     },
+    /// The nominal model predicts something that is no finite number.
+    #[error(
+        "the nominal model of recording `{recording}` predicts values that are no finite numbers: check nominal.toml"
+    )]
+    NotFinite {
+        /// The recording.
+        recording: String,
+    },
     /// Nobody knows where a robot began.
     #[error(
         "without ground truth recording `{recording}` must say where robot {robot} began and how it drove: give it one true pose in truth.csv, and odometry or commands around it"

@@ -42,7 +42,7 @@ pub use compare::{
     ChannelComparison, RobotComparison, command_agitation, compare, end_to_end, residuals, residuals_of,
 };
 pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, diagnose};
-pub use diagnosis::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known};
+pub use diagnosis::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known, log_likelihood};
 pub use error::MismatchError;
 pub use evidence::Evidence;
 pub use findings::{

@@ -87,7 +87,7 @@ pub(crate) fn with_another(units: &[&Unit<'_>], known: &[State], terms: &[Term])
     let state = |(unit, state): (&&Unit<'_>, &State)| {
         let residuals = residuals(unit, terms, &|channel| touches(added, channel), Some(&state.residuals))?;
         let noise = noise::estimate(unit, terms, &residuals, Some(&state.noise));
-        Some(State { noise, residuals })
+        Some(State { residuals, noise })
     };
     units.iter().zip(known).map(state).collect()
 }

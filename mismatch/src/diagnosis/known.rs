@@ -10,6 +10,7 @@ use pleiad_physics::{Effect, Fit as How};
 use pleiad_recording::Recording;
 
 use crate::builtin;
+use crate::diagnose::{DiagnoseOptions, TruthUse};
 use crate::diagnosis::candidate::candidates;
 use crate::diagnosis::entries::is_shared;
 use crate::diagnosis::fit::{Effort, Fit, fit};
@@ -20,8 +21,10 @@ use crate::diagnosis::robust::{Robust, robust};
 use crate::diagnosis::run::{Prepared, member};
 use crate::diagnosis::select::{Scored, fit_beside, score, whites};
 use crate::diagnosis::spread::{is_of_spread, known, known_swap};
+use crate::diagnosis::support::slack;
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
+use crate::diagnosis::without_truth::{teams, withheld_of};
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
 use crate::findings::Estimate;
@@ -128,6 +131,54 @@ pub fn fit_known(
     });
     let of_spread = of_spread.map(|estimated| known_fit(&units, &estimated, &|_| Z_95, None));
     Ok(of_mean.into_iter().chain(of_spread).collect())
+}
+
+/// How well effects of one robot explain a recording, with their parameters fitted and with what the nominal geometry may
+/// be off by: a log-likelihood, to be compared with that of other effects on the same recording.
+///
+/// # Errors
+/// As [`diagnose`](crate::diagnose()); a prediction is no finite number.
+pub fn log_likelihood(
+    recording: &Recording,
+    robot: RobotId,
+    effects: &[Effect],
+    options: &DiagnoseOptions,
+) -> Result<f64, MismatchError> {
+    let by_reference = options.truth == TruthUse::No;
+    let withheld;
+    let recording = if by_reference || options.without_landmarks {
+        withheld = withheld_of(recording, options)?;
+        &withheld
+    } else {
+        recording
+    };
+    let models = builtin::models(recording)?;
+    let evidence = if by_reference {
+        Evidence::by_reference(recording, &models)
+    } else {
+        Evidence::new(recording, &models)
+    };
+    let prepared = Prepared { recording, evidence, models, tested: false };
+    let alone = |(own, model): (&RobotId, &pleiad_physics::RobotModel<f64>)| {
+        Unit::new(&prepared.evidence, 0, vec![member(recording, *own, model)])
+    };
+    let shared = effects.iter().any(|effect| is_shared(effect.info()));
+    let concerned = prepared.models.iter().filter(|(own, _)| shared || by_reference || **own == robot);
+    let all: Vec<Unit<'_>> = concerned.map(alone).collect();
+    let joined = if by_reference { teams(&all, std::slice::from_ref(&prepared))? } else { Vec::new() };
+    let units: Vec<&Unit<'_>> = if by_reference { &joined } else { &all }.iter().collect();
+    let units: Vec<&Unit<'_>> = units.into_iter().filter(|unit| !unit.rows.is_empty()).collect();
+    let infinite = || MismatchError::NotFinite { recording: recording.name.clone() };
+    let mut current = fit(&units, Vec::new(), &|_| true, Effort::FULL).ok_or_else(infinite)?;
+    for &effect in effects {
+        let whose = if is_shared(effect.info()) { Whose::Everyone } else { Whose::Robot(robot) };
+        if let Some(term) = found(&units, &current, effect, whose) {
+            let mut terms = current.terms.clone();
+            terms.push(term);
+            current = fit(&units, terms, &|_| true, Effort::FULL).unwrap_or(current);
+        }
+    }
+    Ok(current.log_likelihood + slack(&units, &current))
 }
 
 /// An effect where the likelihood is greatest beside a fit, of all its starts.

@@ -39,6 +39,6 @@ mod unit;
 mod white;
 mod without_truth;
 
-pub use known::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known};
+pub use known::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known, log_likelihood};
 pub(crate) use mesh::{LOST, STATES, about, carried, gradient};
 pub(crate) use run::run;

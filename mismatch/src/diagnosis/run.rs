@@ -49,6 +49,7 @@ pub(crate) struct Judgement {
     pub(crate) gain: Gain,
 }
 
+#[allow(clippy::too_many_lines, reason = "the pipeline from top to bottom")]
 pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Diagnosis, MismatchError> {
     let tested = roles(recordings, options)?;
     let by_reference = options.truth == TruthUse::No;

@@ -150,7 +150,7 @@ pub(crate) fn support(
 
 /// What a fit could still gain in log-likelihood by errors of the nominal geometry that are too small to matter: each
 /// as unsure as it is relevant. Two effects between which only those decide are the same.
-fn slack(units: &[&Unit<'_>], fit: &Fit) -> f64 {
+pub(crate) fn slack(units: &[&Unit<'_>], fit: &Fit) -> f64 {
     let mut terms = fit.terms.clone();
     let mut floors = Vec::new();
     for member in units.iter().flat_map(|unit| &unit.members) {

@@ -24,18 +24,23 @@ pub(crate) fn withheld(
     recordings: &[Recording],
     options: &DiagnoseOptions,
 ) -> Result<Vec<Recording>, MismatchError> {
-    let one = |recording: &Recording| {
-        let mut recording = recording.clone();
-        if options.without_landmarks {
-            let of_landmark =
-                |reading: &Reading| matches!(reading, Reading::Sighting { target: Target::Landmark(_), .. });
-            for own in recording.robots.values_mut() {
-                own.sightings.retain(|sample| !of_landmark(&sample.reading));
-            }
+    recordings.iter().map(|recording| withheld_of(recording, options)).collect()
+}
+
+/// A copy without landmarks, or with references for truth.
+pub(crate) fn withheld_of(
+    recording: &Recording,
+    options: &DiagnoseOptions,
+) -> Result<Recording, MismatchError> {
+    let mut recording = recording.clone();
+    if options.without_landmarks {
+        let of_landmark =
+            |reading: &Reading| matches!(reading, Reading::Sighting { target: Target::Landmark(_), .. });
+        for own in recording.robots.values_mut() {
+            own.sightings.retain(|sample| !of_landmark(&sample.reading));
         }
-        if options.truth == TruthUse::No { referred(&recording) } else { Ok(recording) }
-    };
-    recordings.iter().map(one).collect()
+    }
+    if options.truth == TruthUse::No { referred(&recording) } else { Ok(recording) }
 }
 
 /// A copy in which truth is what the team makes of the rest, smoothed over the whole recording.
@@ -118,8 +123,11 @@ fn no_mesh(recording: &str, robot: RobotId) -> MismatchError {
     MismatchError::NoStart { recording: recording.to_owned(), robot }
 }
 
+/// Stamps in seconds, and poses.
+type References = Vec<(f64, Pose<f64>)>;
+
 /// The references of every robot, put where the whole recording says they should be.
-fn smoothed(unit: &Unit<'_>, state: &State) -> Option<Vec<Vec<(f64, Pose<f64>)>>> {
+fn smoothed(unit: &Unit<'_>, state: &State) -> Option<Vec<References>> {
     let (mesh, filter) = unit.mesh.as_ref().zip(state.noise.filter.as_ref())?;
     let corrections = filter.smoothed(mesh, &state.noise.scales, &state.residuals);
     let one = |(index, member): (usize, &Member)| {

@@ -55,7 +55,7 @@ pub(crate) struct Swaps {
 /// Finds the swaps of every robot and gives them to its units' models.
 pub(crate) fn swaps(units: &mut [Unit<'_>]) -> Swaps {
     let mut all = Swaps::default();
-    let mut robots: Vec<RobotId> = units.iter().map(|unit| unit.robot()).collect();
+    let mut robots: Vec<RobotId> = units.iter().map(Unit::robot).collect();
     robots.sort_unstable();
     robots.dedup();
     let mut of_robots: BTreeMap<RobotId, Gains> = BTreeMap::new();
