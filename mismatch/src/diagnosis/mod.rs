@@ -8,7 +8,9 @@
 mod candidate;
 mod chi_square;
 mod corrected;
+mod design;
 mod entries;
+mod explained;
 mod fit;
 mod held_out;
 mod known;
@@ -33,5 +35,7 @@ mod touch;
 mod unit;
 mod white;
 
+pub use design::{Design, DesignColumn, design};
+pub use explained::{Explained, Rival, Structure, explained};
 pub use known::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known};
 pub(crate) use run::run;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_estimation::RobotId;
-use pleiad_physics::{Floors, RobotModel};
+use pleiad_physics::{Effect, Floors, RobotModel};
 use pleiad_recording::Recording;
 
 use crate::builtin;
@@ -18,7 +18,7 @@ use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
 use crate::diagnosis::select::{Entry, Pool, Selected, select};
 use crate::diagnosis::series;
-use crate::diagnosis::spread::{self, SpreadTerm};
+use crate::diagnosis::spread::{self, SpreadTerm, Swaps};
 use crate::diagnosis::support::{Support, support};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
@@ -65,14 +65,14 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         .flat_map(|(index, own)| own.models.iter().map(move |(&robot, model)| (index, own, robot, model)))
         .map(|(index, own, robot, model)| unit(index, own, robot, model))
         .collect();
-    let swaps = spread::swaps(&mut all);
+    let swaps = begun(&mut all, options);
     let fitted: Vec<&Unit<'_>> = all.iter().filter(|unit| !prepared[unit.recording].tested).collect();
     let enough = |unit: &&Unit<'_>| lasting_s(&fitted, unit.robot) >= SHORT_S;
     let units: Vec<&Unit<'_>> =
         fitted.iter().copied().filter(|unit| !unit.rows.is_empty()).filter(enough).collect();
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
-    let mut entries = entries(&fitted);
+    let mut entries = entries(&fitted).tried(options);
     let tried = entries.entries.len() + entries.untestable.len();
     let spread_entries = spread::take(&mut entries, &units);
 
@@ -88,7 +88,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let scored = pool.scored(&units, &entries.entries, &fit);
     entries.untestable.extend(hidden(&units, &entries.entries, &fit, &pool));
     let groups = groups(&units, &fit.terms);
-    let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
+    let mut judgements = judgements(&units, &tests, &fit, &groups, (&pool, options.without.sets), count);
     let spread = spread::spread(&units, &tests, &fit, &spread_entries, &swaps, count);
     spread.explain(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
@@ -148,6 +148,17 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         .map(|own| (own.recording.name.clone(), corrected::corrected(own, &corrected_terms)))
         .collect();
     Ok(Diagnosis { findings, plots, corrected })
+}
+
+/// What comes before anything is fitted: names that are exchanged.
+fn begun(all: &mut [Unit<'_>], options: &DiagnoseOptions) -> Swaps {
+    if options.without.blocks {
+        all.iter_mut().for_each(Unit::make_rows_blocks);
+    }
+    if options.leave_out.contains(&Effect::LandmarkIdentitySwap) {
+        return Swaps::default();
+    }
+    spread::swaps(all)
 }
 
 /// For each recording whether it is tested on; `None` if it is not used.
@@ -223,12 +234,15 @@ fn judgements(
     tests: &[&Unit<'_>],
     fit: &Fit,
     groups: &[Vec<usize>],
-    pool: &Pool,
+    (pool, alone): (&Pool, bool),
     count: usize,
 ) -> Vec<Judgement> {
     let mut all = Vec::new();
     for group in groups {
-        let Some(support) = support(units, fit, group, pool, count) else { continue };
+        let Some(mut support) = support(units, fit, group, pool, count) else { continue };
+        if alone {
+            support.members.truncate(group.len());
+        }
         let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
         let gain = if tests.is_empty() {
             cross_fitted(&acting, &support.with, &support.without)

@@ -197,6 +197,12 @@ impl<'a> Unit<'a> {
         unit
     }
 
+    /// Lets every element be a block of its own: errors count as independent.
+    pub(crate) fn make_rows_blocks(&mut self) {
+        self.blocks = self.rows.len();
+        self.block_of = (0..self.blocks).collect();
+    }
+
     pub(crate) fn stretch(&self, channel: Channel) -> Option<&Stretch> {
         self.stretches.iter().find(|stretch| stretch.channel == channel && stretch.rows > 0)
     }

@@ -45,7 +45,7 @@ impl<'u, 'a> White<'u, 'a> {
     }
 
     /// A column in sigmas, per stretch.
-    fn of(&self, column: &Column) -> Vec<Option<Vec<f64>>> {
+    pub(crate) fn of(&self, column: &Column) -> Vec<Option<Vec<f64>>> {
         let part = |(part, stretch): (&Option<Vec<f64>>, &Stretch)| {
             let factors = &self.factors[stretch.range()];
             part.as_ref()

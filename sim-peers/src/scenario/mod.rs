@@ -19,7 +19,7 @@ pub use declared::Declared;
 pub use drive::{DriveKind, DriveSettings};
 pub use manoeuvre::{ManoeuvreKind, UnknownManoeuvre};
 pub use settings::{
-    Direction, Gps, Gyro, Heading, Motion, MotionNoise, Odometry, OdometryKind, Policy, PriorSettings,
+    Direction, Gps, Gyro, Heading, LastingSlip, Motion, MotionNoise, Odometry, OdometryKind, Policy, PriorSettings,
     RelativeKind, RelativeSensor, RobotSettings, See, Start,
 };
 
