@@ -80,6 +80,46 @@ impl FromStr for Class {
     }
 }
 
+/// A class that is asked for, with a number of seeds of its own or not: `clean`, `clean:100`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    /// Which class.
+    pub class: Class,
+    /// How many seeds; `None`: as many as the others.
+    pub seeds: Option<u64>,
+}
+
+impl From<Class> for Asked {
+    fn from(class: Class) -> Self {
+        Self { class, seeds: None }
+    }
+}
+
+impl fmt::Display for Asked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.seeds {
+            None => write!(f, "{}", self.class),
+            Some(seeds) => write!(f, "{}:{seeds}", self.class),
+        }
+    }
+}
+
+impl FromStr for Asked {
+    type Err = BenchmarkError;
+
+    fn from_str(text: &str) -> Result<Self, BenchmarkError> {
+        let Some((class, seeds)) = text.split_once(':') else {
+            return Ok(Self::from(text.parse::<Class>()?));
+        };
+        let wrong = || BenchmarkError::NoNumber { found: text.to_owned() };
+        match seeds.parse() {
+            Ok(0) => Err(BenchmarkError::NoSeeds),
+            Ok(seeds) => Ok(Self { class: class.parse()?, seeds: Some(seeds) }),
+            Err(_) => Err(wrong()),
+        }
+    }
+}
+
 /// The noise of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

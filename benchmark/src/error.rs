@@ -14,14 +14,20 @@ pub enum BenchmarkError {
         /// What was asked for.
         found: String,
     },
+    /// A number of seeds that is none.
+    #[error("found {found:?}, expected a class, or a class and how many seeds, as clean:100")]
+    NoNumber {
+        /// What was asked for.
+        found: String,
+    },
     /// No seed.
     #[error("0 seeds: nothing would be run; ask for at least 1")]
     NoSeeds,
     /// Nothing has a name like this.
-    #[error("no case of the classes asked for has {found:?} in its name; names are as {example}")]
+    #[error("no case of the classes asked for has {} in its name; names are as {example}", found.join(" or "))]
     NoCase {
         /// What was asked for.
-        found: String,
+        found: Vec<String>,
         /// A name.
         example: String,
     },
@@ -68,7 +74,9 @@ pub enum BenchmarkError {
         expected: String,
     },
     /// The answers changed while cases were run.
-    #[error("the answers hash to {found}, but {sealed} was sealed before the first diagnosis: nothing is scored")]
+    #[error(
+        "the answers hash to {found}, but {sealed} was sealed before the first diagnosis: nothing is scored"
+    )]
     BrokenSeal {
         /// Now.
         found: String,

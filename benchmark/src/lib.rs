@@ -17,7 +17,7 @@ pub mod seal;
 mod summary;
 
 pub use cases::{Case, Plan, plans};
-pub use class::{Class, Noise};
+pub use class::{Asked, Class, Noise};
 pub use error::BenchmarkError;
 pub use page::page;
 pub use results::CaseResult;

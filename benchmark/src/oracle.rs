@@ -16,6 +16,8 @@ use crate::seal::{Answer, Injected};
 pub const DETECTABLE: f64 = 30.0;
 /// The same lost by the best rival, from which it is identifiable.
 pub const IDENTIFIABLE: f64 = 12.0;
+/// In place of more than any test could say.
+const CERTAIN: f64 = 1e6;
 /// What anyone would refit first.
 const REFITTED: [Effect; 2] = [Effect::WheelRadiusError, Effect::TrackWidthError];
 
@@ -77,16 +79,14 @@ pub fn oracle(recording: &Recording, answer: &Answer, said: &Findings) -> Result
     if !same {
         structures.push(tool);
     }
-    let all: Vec<Explained> =
-        if of_mean(&truth) { explained(recording, &structures)? } else { Vec::new() };
+    let all: Vec<Explained> = if of_mean(&truth) { explained(recording, &structures)? } else { Vec::new() };
     if let Some(whole) = all.first() {
         oracle.inflation = whole.inflation;
         let deflated = |gain: f64| gain / whole.inflation;
         let name = |robot: Option<RobotId>| robot.map_or(0, |robot| robot.0);
         let rivals = whole.rivals.iter();
-        oracle.rivals = rivals
-            .map(|own| (own.effect.name().to_owned(), name(own.robot), deflated(own.loses)))
-            .collect();
+        oracle.rivals =
+            rivals.map(|own| (own.effect.name().to_owned(), name(own.robot), deflated(own.loses))).collect();
         let tool = if same { whole.held_out } else { all.last().map_or(0.0, |own| own.held_out) };
         oracle.held_out = Some([whole.held_out, whole.held_out_se, all[parts].held_out, tool]);
     }
@@ -94,12 +94,18 @@ pub fn oracle(recording: &Recording, answer: &Answer, said: &Findings) -> Result
     for (index, own) in answer.injected.iter().enumerate() {
         let Some(effect) = Effect::from_name(&own.effect) else { continue };
         let fit = match all.first() {
-            Some(whole) => whole.fits.iter().find(|fit| {
-                fit.effect == effect && own.robots.iter().all(|robot| fit.robots.contains(&RobotId(*robot)))
-            }).cloned(),
-            None => own.robots.first().and_then(|robot| {
-                fit_known(recording, RobotId(*robot), &[effect]).ok()?.into_iter().next()
-            }),
+            Some(whole) => whole
+                .fits
+                .iter()
+                .find(|fit| {
+                    fit.effect == effect
+                        && own.robots.iter().all(|robot| fit.robots.contains(&RobotId(*robot)))
+                })
+                .cloned(),
+            None => own
+                .robots
+                .first()
+                .and_then(|robot| fit_known(recording, RobotId(*robot), &[effect]).ok()?.into_iter().next()),
         };
         let mut known = Known { effect: own.effect.clone(), ..Known::default() };
         if let Some(fit) = &fit {
@@ -125,9 +131,9 @@ fn wald(fit: &pleiad_mismatch::KnownFit) -> f64 {
         Some(error) if parameter.off.is_finite() => ((own.value - parameter.off) / error).powi(2),
         // Tails are off at infinity: their inverse, by the delta method.
         Some(error) => (own.value / error).powi(2),
-        None => 1e6,
+        None => CERTAIN,
     });
-    ratios.fold(0.0, f64::max)
+    ratios.filter(|ratio| !ratio.is_nan()).fold(0.0, f64::max).min(CERTAIN)
 }
 
 /// The effects of the spread, of chance and of names: they move no mean.
@@ -159,7 +165,11 @@ fn structure(injected: &[Injected]) -> Structure {
 fn named(findings: &[Finding]) -> Structure {
     let one = |own: &Finding| {
         let effect = Effect::from_name(own.effect.as_deref()?)?;
-        let robots = if acts_on_every_robot(effect) { &own.robots[..1.min(own.robots.len())] } else { &own.robots[..] };
+        let robots = if acts_on_every_robot(effect) {
+            &own.robots[..1.min(own.robots.len())]
+        } else {
+            &own.robots[..]
+        };
         Some(robots.iter().map(|robot| (effect, RobotId(*robot))).collect::<Vec<_>>())
     };
     findings.iter().filter_map(one).flatten().collect()

@@ -11,7 +11,7 @@ use pleiad_sim_peers::{Scenario, simulate};
 
 use crate::baseline::{self, Selection};
 use crate::cases::{Case, Plan, added, plans};
-use crate::class::Class;
+use crate::class::Asked;
 use crate::error::BenchmarkError;
 use crate::oracle::oracle;
 use crate::results::{self, CaseResult};
@@ -29,13 +29,13 @@ pub const RESULTS: &str = "results.jsonl";
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Which classes.
-    pub classes: Vec<Class>,
+    pub classes: Vec<Asked>,
     /// The first seed.
     pub first_seed: u64,
-    /// How many seeds.
+    /// How many seeds of each that does not say it.
     pub seeds: u64,
-    /// Only cases with this in their names.
-    pub only: Option<String>,
+    /// Only cases with one of these in their names; all if empty.
+    pub only: Vec<String>,
     /// Takes up a run that stopped.
     pub resume: bool,
     /// Whether diagnoses that lack a part are run as well.
@@ -65,13 +65,15 @@ pub fn chosen(options: &Options) -> Result<Vec<Plan>, BenchmarkError> {
     if options.seeds == 0 {
         return Err(BenchmarkError::NoSeeds);
     }
-    let seeds = options.first_seed..options.first_seed.saturating_add(options.seeds);
-    let all = plans(&options.classes, seeds);
-    let Some(only) = &options.only else { return Ok(all) };
+    let all = plans(&options.classes, options.first_seed, options.seeds);
+    if options.only.is_empty() {
+        return Ok(all);
+    }
     let example = all.first().map_or_else(String::new, |plan| plan.id.clone());
-    let kept: Vec<Plan> = all.into_iter().filter(|plan| plan.id.contains(only.as_str())).collect();
+    let wanted = |plan: &Plan| options.only.iter().any(|part| plan.id.contains(part.as_str()));
+    let kept: Vec<Plan> = all.into_iter().filter(wanted).collect();
     if kept.is_empty() {
-        return Err(BenchmarkError::NoCase { found: only.clone(), example });
+        return Err(BenchmarkError::NoCase { found: options.only.clone(), example });
     }
     Ok(kept)
 }

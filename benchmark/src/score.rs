@@ -201,8 +201,7 @@ pub fn of_rectangles(a: [f64; 4], b: [f64; 4]) -> f64 {
 /// Of an interval and those of a finding; throughout is no interval.
 fn of_times(truth: [f64; 2], place: &Place) -> f64 {
     let length = |[from, to]: [f64; 2]| (to - from).max(0.0);
-    let both: f64 =
-        place.time.iter().map(|own| length([own[0].max(truth[0]), own[1].min(truth[1])])).sum();
+    let both: f64 = place.time.iter().map(|own| length([own[0].max(truth[0]), own[1].min(truth[1])])).sum();
     let found: f64 = place.time.iter().map(|own| length(*own)).sum();
     both / (length(truth) + found - both).max(f64::MIN_POSITIVE)
 }

@@ -5,7 +5,7 @@ mod values;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use pleiad_benchmark::Class;
+use pleiad_benchmark::Asked;
 use pleiad_estimation::strategy::StrategyKind;
 use pleiad_sim_peers::scenario::ManoeuvreKind;
 
@@ -250,12 +250,12 @@ pub struct ConcealedArgs {
     #[arg(long, default_value_t = 1)]
     pub first_seed: u64,
     /// Which classes: clean, single, masked, absorbed, cancelling, buried, rare, out_of_catalogue,
-    /// unidentifiable, decoy. Default: all.
+    /// unidentifiable, decoy; with a number of seeds of its own as in clean:100. Default: all.
     #[arg(long, value_name = "CLASS", num_args = 1.., value_delimiter = ',')]
-    pub class: Vec<Class>,
-    /// Only cases with this in their names, as in single/crab/x1/white/1.
-    #[arg(long, value_name = "TEXT")]
-    pub only: Option<String>,
+    pub class: Vec<Asked>,
+    /// Only cases with one of these in their names, as in single/crab/x1/white/1.
+    #[arg(long, value_name = "TEXT", num_args = 1..)]
+    pub only: Vec<String>,
     /// Also diagnose without blocks of time, without scans for places and onsets, and without sets.
     #[arg(long)]
     pub ablations: bool,

@@ -81,7 +81,9 @@ impl Folds {
         let lengths: Vec<f64> = design
             .columns
             .iter()
-            .map(|own| own.parts.iter().flat_map(|(_, values)| values).map(|value| value * value).sum::<f64>())
+            .map(|own| {
+                own.parts.iter().flat_map(|(_, values)| values).map(|value| value * value).sum::<f64>()
+            })
             .map(|square| if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 })
             .collect();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share")]

@@ -23,6 +23,7 @@ pub fn joint(folds: &Folds) -> Vec<f64> {
     let covariance = factor.inverse();
     let freedom = own.rows.saturating_sub(size).max(1) as f64;
     let noise = own.left(&solved).max(0.0) / freedom;
-    let significant = |index: usize| solved[index].abs() > critical * (noise * covariance[(index, index)]).sqrt();
+    let significant =
+        |index: usize| solved[index].abs() > critical * (noise * covariance[(index, index)]).sqrt();
     all.iter().map(|&index| if significant(index) { solved[index] } else { 0.0 }).collect()
 }

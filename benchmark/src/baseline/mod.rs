@@ -76,7 +76,11 @@ fn selection(design: &Design, coefficients: &[f64], answer: &Answer) -> Selectio
     ordered.sort_by(|a, b| b.1.total_cmp(&a.1));
     let found = ordered.iter().filter(|(name, _)| injected.contains(name)).count();
     Selection {
-        strongest: ordered.iter().take(20).map(|((effect, robot), _)| (effect.name().to_owned(), *robot)).collect(),
+        strongest: ordered
+            .iter()
+            .take(20)
+            .map(|((effect, robot), _)| (effect.name().to_owned(), *robot))
+            .collect(),
         selected: ordered.len(),
         found,
         of: injected.len(),

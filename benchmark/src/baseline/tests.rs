@@ -68,8 +68,18 @@ fn a_lasso_of_orthogonal_columns_is_the_soft_threshold() {
         errors: vec![3.0, 0.5, 0.0, 0.0, 0.0],
         shares: vec![0.0; 5],
         columns: vec![
-            DesignColumn { effect: Effect::Crab, robot: None, parameter: String::new(), parts: vec![(0, vec![1.0])] },
-            DesignColumn { effect: Effect::Push, robot: None, parameter: String::new(), parts: vec![(1, vec![1.0])] },
+            DesignColumn {
+                effect: Effect::Crab,
+                robot: None,
+                parameter: String::new(),
+                parts: vec![(0, vec![1.0])],
+            },
+            DesignColumn {
+                effect: Effect::Push,
+                robot: None,
+                parameter: String::new(),
+                parts: vec![(1, vec![1.0])],
+            },
         ],
     };
     let folds = Folds::of(&own);

@@ -27,7 +27,8 @@ fn fitted(own: &Regression, threshold: f64) -> DVector<f64> {
     let mut kept: Vec<usize> = (0..own.right.len()).collect();
     for _ in 0..ROUNDS {
         let solved = own.solved(&kept);
-        let next: Vec<usize> = kept.iter().copied().filter(|&index| solved[index].abs() >= threshold).collect();
+        let next: Vec<usize> =
+            kept.iter().copied().filter(|&index| solved[index].abs() >= threshold).collect();
         if next.len() == kept.len() {
             return solved;
         }

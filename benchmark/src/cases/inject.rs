@@ -131,7 +131,8 @@ pub(crate) fn injected(
     let info = effect.info();
     let labels = info.parameters.iter().map(Parameter::label);
     let corner = |label: &str| info.parameter(label).and_then(|(index, _)| values.get(index).copied());
-    let region_m = match ["region_m.x_min", "region_m.x_max", "region_m.y_min", "region_m.y_max"].map(corner) {
+    let region_m = match ["region_m.x_min", "region_m.x_max", "region_m.y_min", "region_m.y_max"].map(corner)
+    {
         [Some(x0), Some(x1), Some(y0), Some(y1)] => Some([x0, x1, y0, y1]),
         _ => None,
     };

@@ -1,26 +1,19 @@
 //! Which cases there are.
 
-use std::ops::Range;
-
 use pleiad_physics::Effect;
 
 use super::inject::has_size;
 use super::{Plan, What};
-use crate::class::{Class, Noise};
+use crate::class::{Asked, Class, Noise};
 
 /// Sizes of single effects over the typical ones.
 const SIZES: [f64; 3] = [0.3, 1.0, 3.0];
 
 /// Effects that a value of the nominal model is tuned to hide.
-pub(super) const ABSORBED: [Effect; 4] = [
-    Effect::PayloadAdded,
-    Effect::SpeedDependentScale,
-    Effect::ReverseAsymmetry,
-    Effect::GyroThermalDrift,
-];
+pub(super) const ABSORBED: [Effect; 4] =
+    [Effect::PayloadAdded, Effect::SpeedDependentScale, Effect::ReverseAsymmetry, Effect::GyroThermalDrift];
 /// The first of two that cancel.
-const CANCELLING: [Effect; 3] =
-    [Effect::RangeBias, Effect::WheelRadiusError, Effect::SensorYawMisalignment];
+const CANCELLING: [Effect; 3] = [Effect::RangeBias, Effect::WheelRadiusError, Effect::SensorYawMisalignment];
 /// A small effect and a large one of the same robot, in the same channel.
 const BURIED: [(Effect, Effect); 5] = [
     (Effect::UnequalWheelRadii, Effect::TrackWidthError),
@@ -38,18 +31,17 @@ const RARE: [Effect; 5] = [
     Effect::LongitudinalSlip,
 ];
 /// Effects that circling at one speed cannot tell from others.
-const CIRCLING: [Effect; 4] = [
-    Effect::TrackWidthError,
-    Effect::UnequalWheelRadii,
-    Effect::WheelRadiusError,
-    Effect::GyroScale,
-];
+const CIRCLING: [Effect; 4] =
+    [Effect::TrackWidthError, Effect::UnequalWheelRadii, Effect::WheelRadiusError, Effect::GyroScale];
 
-/// The cases of classes, seed by seed.
-pub fn plans(classes: &[Class], seeds: Range<u64>) -> Vec<Plan> {
+/// The cases of classes, seed by seed: of each as many seeds as it asks for, or so many.
+pub fn plans(asked: &[Asked], first_seed: u64, seeds: u64) -> Vec<Plan> {
+    let most = asked.iter().map(|own| own.seeds.unwrap_or(seeds)).max().unwrap_or(0);
     let mut all = Vec::new();
-    for seed in seeds {
-        for &class in classes {
+    for index in 0..most {
+        let seed = first_seed.saturating_add(index);
+        for own in asked.iter().filter(|own| index < own.seeds.unwrap_or(seeds)) {
+            let class = own.class;
             for (name, noise, what) in of(class) {
                 let id = format!("{class}/{name}/{noise}/{seed}");
                 all.push(Plan { id, class, noise, what });

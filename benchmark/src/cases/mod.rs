@@ -24,12 +24,18 @@ pub use told_apart::added;
 pub(crate) enum What {
     Nothing,
     /// One effect at a size over the typical one.
-    Effect { effect: Effect, size: f64 },
+    Effect {
+        effect: Effect,
+        size: f64,
+    },
     Masked,
     Absorbed(Effect),
     /// The first of the pair, which the second cancels on average.
     Cancelling(Effect),
-    Buried { small: Effect, large: Effect },
+    Buried {
+        small: Effect,
+        large: Effect,
+    },
     Rare(Effect),
     LeftOut(Effect),
     Circling(Effect),

@@ -69,4 +69,3 @@ fn place(track: &Track, duration_s: f64, draw: &mut Draw) -> Option<[f64; 4]> {
         (SHARES[0]..=SHARES[1]).contains(&share).then_some(bounds)
     })
 }
-

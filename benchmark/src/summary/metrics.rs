@@ -103,7 +103,11 @@ fn said<'c>(
         covered(rows, method, "intervals that hold the truth, after selection", found());
         rows.mean(method, "relative error of parameters", found().map(relative));
         let overlaps = || clear().filter_map(|own| own.overlap);
-        rows.share(method, "overlap at least 0.7, of identifiable and named", overlaps().map(|own| own >= OVERLAP));
+        rows.share(
+            method,
+            "overlap at least 0.7, of identifiable and named",
+            overlaps().map(|own| own >= OVERLAP),
+        );
         rows.mean(method, "extra names per recording", all().map(|own| own.extra.len() as f64));
         rows.share(method, "recordings with an extra name", all().map(|own| !own.extra.is_empty()));
     }
@@ -164,9 +168,7 @@ fn of_class(rows: &mut Rows<'_>, cases: &[&CaseResult]) {
                 let own = cases.iter().filter(|own| own.oracle.effects.iter().all(|known| known.detectable));
                 own.filter(|own| own.oracle.rivals.first().is_none_or(|rival| rival.2 >= IDENTIFIABLE))
             };
-            let expressed = |own: &&&CaseResult| {
-                own.tool.nameless.iter().any(|said| said.contains('['))
-            };
+            let expressed = |own: &&&CaseResult| own.tool.nameless.iter().any(|said| said.contains('['));
             rows.share(TOOL, "wrong name", clear().map(|own| !own.tool.extra.is_empty()));
             rows.share(TOOL, "an expression", clear().map(|own| expressed(&own)));
             let without = |own: &&&CaseResult| {
@@ -177,9 +179,7 @@ fn of_class(rows: &mut Rows<'_>, cases: &[&CaseResult]) {
             rows.share(TOOL, "nothing said", clear().map(|own| nothing(own)));
         }
         Class::Unidentifiable => {
-            let seen = || {
-                cases.iter().filter(|own| own.oracle.effects.iter().all(|known| known.detectable))
-            };
+            let seen = || cases.iter().filter(|own| own.oracle.effects.iter().all(|known| known.detectable));
             let said = |own: &CaseResult| own.tool.verdict == "cannot_tell";
             rows.share(TOOL, "cannot_tell, of detectable", seen().map(|own| said(own)));
             let proposed = |own: &CaseResult| own.tool.manoeuvre.is_some();

@@ -26,9 +26,8 @@ impl Entries {
     /// Without what is not to be tried.
     pub(crate) fn tried(mut self, options: &DiagnoseOptions) -> Self {
         let placed = |effect: Effect| Placing::of(effect.info()).is_some();
-        let dropped = |effect: Effect| {
-            options.leave_out.contains(&effect) || (options.without.scans && placed(effect))
-        };
+        let dropped =
+            |effect: Effect| options.leave_out.contains(&effect) || (options.without.scans && placed(effect));
         self.entries.retain(|(effect, _)| !dropped(*effect));
         self.untestable.retain(|own| !Effect::from_name(&own.effect).is_some_and(dropped));
         self

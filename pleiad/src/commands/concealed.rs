@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Context;
-use pleiad_benchmark::{Class, Options, Outcome, Summary, chosen, page, run as run_cases, summary};
+use pleiad_benchmark::{Asked, Class, Options, Outcome, Summary, chosen, page, run as run_cases, summary};
 use pleiad_report::write_summary;
 
 use crate::cli::ConcealedArgs;
@@ -12,7 +12,11 @@ use crate::{folder, output};
 
 pub fn run(args: &ConcealedArgs) -> anyhow::Result<()> {
     let mut options = Options {
-        classes: if args.class.is_empty() { Class::ALL.to_vec() } else { args.class.clone() },
+        classes: if args.class.is_empty() {
+            Class::ALL.map(Asked::from).to_vec()
+        } else {
+            args.class.clone()
+        },
         first_seed: args.first_seed,
         seeds: args.seeds,
         only: args.only.clone(),
@@ -49,11 +53,11 @@ fn command(args: &ConcealedArgs) -> String {
         let _ = write!(text, " --first-seed {}", args.first_seed);
     }
     if !args.class.is_empty() {
-        let names: Vec<&str> = args.class.iter().map(|class| class.name()).collect();
+        let names: Vec<String> = args.class.iter().map(ToString::to_string).collect();
         let _ = write!(text, " --class {}", names.join(" "));
     }
-    if let Some(only) = &args.only {
-        let _ = write!(text, " --only {only}");
+    if !args.only.is_empty() {
+        let _ = write!(text, " --only {}", args.only.join(" "));
     }
     if args.ablations {
         text += " --ablations";

@@ -164,7 +164,12 @@ impl Check {
         self.above_zero("odometry.lasting.time_constant_s", lasting.time_constant_s)?;
         let degrees = settings.noise_degrees_of_freedom;
         let known = degrees == 0.0 || (degrees.is_finite() && degrees > 2.0);
-        self.require(known, "noise_degrees_of_freedom", degrees, "a finite number above 2, or 0 for normal noise")?;
+        self.require(
+            known,
+            "noise_degrees_of_freedom",
+            degrees,
+            "a finite number above 2, or 0 for normal noise",
+        )?;
         self.rate("gyro.rate_hz", settings.gyro.rate_hz, 0.0)?;
         self.above_zero("gyro.sigma_rad_s", settings.gyro.sigma_rad_s)?;
         self.finite("gyro.bias_rad_s", settings.gyro.bias_rad_s)?;
