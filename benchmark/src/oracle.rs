@@ -5,7 +5,7 @@ use pleiad_estimation::RobotId;
 use pleiad_mismatch::{
     Explained, Finding, Findings, MismatchError, Structure, acts_on_every_robot, explained, fit_known,
 };
-use pleiad_physics::Effect;
+use pleiad_physics::{Effect, Fit};
 use pleiad_recording::Recording;
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,25 @@ pub struct Oracle {
     /// the refitted nominal model, and by what the tool said. `None` where effects of spread act, which it cannot
     /// tell.
     pub held_out: Option<[f64; 4]>,
+}
+
+impl Oracle {
+    /// What the best rival loses; `None` if nothing comes near. One with more parameters than the true structure may
+    /// have the truth within it, and is no rival.
+    pub fn best_rival(&self) -> Option<f64> {
+        let sizes = |name: &str| {
+            let parameters = Effect::from_name(name).map_or(&[][..], |effect| effect.info().parameters);
+            parameters.iter().filter(|own| own.fit != Fit::Choice).count()
+        };
+        let truth: usize = self.effects.iter().map(|own| sizes(&own.effect)).sum();
+        let rivals = self.rivals.iter().filter(|(name, _, _)| sizes(name) <= truth);
+        rivals.map(|(_, _, loses)| *loses).min_by(f64::total_cmp)
+    }
+
+    /// Whether a rival does nearly as well.
+    pub fn has_rival(&self) -> bool {
+        self.best_rival().is_some_and(|loses| loses < IDENTIFIABLE)
+    }
 }
 
 /// An effect that is known to act.
@@ -90,7 +109,6 @@ pub fn oracle(recording: &Recording, answer: &Answer, said: &Findings) -> Result
         let tool = if same { whole.held_out } else { all.last().map_or(0.0, |own| own.held_out) };
         oracle.held_out = Some([whole.held_out, whole.held_out_se, all[parts].held_out, tool]);
     }
-    let lone = oracle.rivals.first().is_none_or(|(_, _, loses)| *loses >= IDENTIFIABLE);
     for (index, own) in answer.injected.iter().enumerate() {
         let Some(effect) = Effect::from_name(&own.effect) else { continue };
         let fit = match all.first() {
@@ -118,8 +136,11 @@ pub fn oracle(recording: &Recording, answer: &Answer, said: &Findings) -> Result
             None => fit.as_ref().map_or(0.0, wald),
         };
         known.detectable = known.gain >= DETECTABLE;
-        known.identifiable = known.detectable && lone;
         oracle.effects.push(known);
+    }
+    let lone = !oracle.has_rival();
+    for known in &mut oracle.effects {
+        known.identifiable = known.detectable && lone;
     }
     Ok(oracle)
 }
@@ -203,4 +224,27 @@ fn refitted(truth: &Structure, tool: &Structure) -> Structure {
         .filter(|effect| !acts(*effect))
         .flat_map(|effect| robots.iter().map(move |robot| (effect, *robot)))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn oracle(effect: &str, rivals: &[(&str, f64)]) -> Oracle {
+        Oracle {
+            effects: vec![Known { effect: effect.to_owned(), ..Known::default() }],
+            rivals: rivals.iter().map(|(name, loses)| ((*name).to_owned(), 2, *loses)).collect(),
+            ..Oracle::default()
+        }
+    }
+
+    #[test]
+    fn a_rival_is_one_that_loses_little_and_has_no_more_parameters() {
+        assert!(oracle("longitudinal_slip", &[("turn_loss", 11.9)]).has_rival());
+        assert!(!oracle("longitudinal_slip", &[("turn_loss", 12.1)]).has_rival());
+        // Slip and skid in one: it holds the truth.
+        assert!(!oracle("longitudinal_slip", &[("low_friction_overall", 0.1)]).has_rival());
+        assert!(oracle("low_friction_overall", &[("longitudinal_slip", 5.0)]).has_rival());
+        assert!(!oracle("longitudinal_slip", &[]).has_rival());
+    }
 }

@@ -34,6 +34,8 @@ pub struct Answer {
     pub noise: Noise,
     /// The size over the typical one, where there is one.
     pub size: Option<f64>,
+    /// SHA-256 of all that the recording is made from: the seed and the settings. Another recording is another answer.
+    pub recording_sha256: String,
     /// What acts.
     pub injected: Vec<Injected>,
     /// Effects that the tool's catalogue is made to lack.
@@ -87,6 +89,7 @@ mod tests {
             class: Class::Single,
             noise: Noise::White,
             size: Some(1.0),
+            recording_sha256: sha256(b"a scenario"),
             injected: vec![Injected {
                 effect: "crab".to_owned(),
                 robots: vec![2],

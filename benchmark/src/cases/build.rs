@@ -10,7 +10,7 @@ use super::inject::{inject, injected, robot_for, values};
 use super::{Case, Plan, What, rare};
 use crate::class::Noise;
 use crate::error::BenchmarkError;
-use crate::seal::{Answer, Injected};
+use crate::seal::{Answer, Injected, sha256};
 
 /// The recording that all cases begin with.
 const SCENARIO: &str = include_str!("../../../scenarios/concealed.toml");
@@ -30,9 +30,12 @@ const DIAMETER_RATIO: f64 = 1.004;
 const TRACK_RATIO: f64 = 1.0339;
 const SIDE_M: f64 = 4.0;
 const SQUARE_SPEED_M_S: f64 = 0.4;
-const SQUARE_TURN_RAD_S: f64 = 0.8;
+/// A quarter of a turn takes so long, seconds: a whole number of commands, so that it is exact.
+const QUARTER_S: f64 = 2.0;
 /// It stands still so long at each corner, seconds, while the servo settles.
 const CORNER_S: f64 = 0.6;
+/// And so long at the beginning, seconds: what is commanded then changes between commands, never at one.
+const FIRST_S: f64 = 0.62;
 
 /// The share of the typical size of a small effect, and that of the large one over it.
 const SMALL: f64 = 0.5;
@@ -82,6 +85,7 @@ pub(super) fn build(plan: &Plan) -> Result<Case, BenchmarkError> {
         class: plan.class,
         noise: plan.noise,
         size,
+        recording_sha256: sha256(format!("{seed} {scenario:?}").as_bytes()),
         injected,
         left_out: left_out.iter().map(|effect| effect.name().to_owned()).collect(),
     };
@@ -139,17 +143,19 @@ fn masked(scenario: &mut Scenario, draw: &mut Draw) -> Result<Vec<Injected>, Ben
         let x_m = (index as f64 - 1.0) * (SIDE_M + 1.0) - 0.5 * SIDE_M;
         own.start = Some(Start { x_m, y_m: -0.5 * SIDE_M, heading_rad: 0.0 });
         own.motion.policy = Policy::Script;
-        let turn_s = 0.5 * std::f64::consts::PI / SQUARE_TURN_RAD_S;
+        // A command that comes at another time turns the robot by another angle.
+        own.command_jitter_s = 0.0;
         let leg = [
             [SQUARE_SPEED_M_S, 0.0, SIDE_M / SQUARE_SPEED_M_S],
             [0.0, 0.0, CORNER_S],
-            [0.0, SQUARE_TURN_RAD_S, turn_s],
+            [0.0, 0.5 * std::f64::consts::PI / QUARTER_S, QUARTER_S],
             [0.0, 0.0, CORNER_S],
         ];
         let lap_s = 4.0 * leg.iter().map(|row| row[2]).sum::<f64>();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few laps")]
         let laps = (scenario.duration_s / lap_s).ceil() as usize;
-        own.motion.script = leg.repeat(4 * laps);
+        own.motion.script = vec![[0.0, 0.0, FIRST_S]];
+        own.motion.script.extend(leg.repeat(4 * laps));
     }
     let robot = [1, 2, 3].map(RobotId)[draw.below(3)];
     // The left wheel is larger by half the ratio, the right one smaller by as much.

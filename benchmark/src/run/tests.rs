@@ -130,7 +130,8 @@ fn the_masked_robot_comes_back_one_way_round_and_not_the_other() {
     let end_m = |scenario: &Scenario| {
         let track = &simulate(scenario, case.seed).unwrap().tracks[&robot];
         let script = &scenario.robots[&robot].motion.script;
-        let lap_s: f64 = script[..16].iter().map(|row| row[2]).sum();
+        // Standing still first, then four times a side, a stop, a turn and a stop.
+        let lap_s: f64 = script[..17].iter().map(|row| row[2]).sum();
         let end = track.pose_at(pleiad_estimation::Timestamp::from_seconds(lap_s)).position();
         (end - track.start().position()).norm()
     };

@@ -17,7 +17,15 @@ fn injected(effect: &str, robots: &[u32], parameters: &[(&str, f64)]) -> Injecte
 
 fn answer(injected: Vec<Injected>) -> Answer {
     let (class, noise) = (Class::Single, Noise::White);
-    Answer { id: "a".to_owned(), class, noise, size: Some(1.0), injected, left_out: Vec::new() }
+    Answer {
+        id: "a".to_owned(),
+        class,
+        noise,
+        size: Some(1.0),
+        recording_sha256: String::new(),
+        injected,
+        left_out: Vec::new(),
+    }
 }
 
 fn finding(set: &[&str], robots: &[u32], parameters: &[(&str, f64, [f64; 2])]) -> Finding {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::{CaseResult, Class, Effect, Group, Match, Mean, ParameterError, Row, Scored, Share};
-use crate::oracle::{IDENTIFIABLE, Known};
+use crate::oracle::Known;
 
 /// The tool's own name among methods.
 const TOOL: &str = "tool";
@@ -166,7 +166,7 @@ fn of_class(rows: &mut Rows<'_>, cases: &[&CaseResult]) {
             // Where something else does as well, its name is no wrong one.
             let clear = || {
                 let own = cases.iter().filter(|own| own.oracle.effects.iter().all(|known| known.detectable));
-                own.filter(|own| own.oracle.rivals.first().is_none_or(|rival| rival.2 >= IDENTIFIABLE))
+                own.filter(|own| !own.oracle.has_rival())
             };
             let expressed = |own: &&&CaseResult| own.tool.nameless.iter().any(|said| said.contains('['));
             rows.share(TOOL, "wrong name", clear().map(|own| !own.tool.extra.is_empty()));
