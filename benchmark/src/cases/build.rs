@@ -34,6 +34,9 @@ const SQUARE_SPEED_M_S: f64 = 0.4;
 const QUARTER_S: f64 = 2.0;
 /// It stands still so long at each corner, seconds, while the servo settles.
 const CORNER_S: f64 = 0.6;
+/// The jitter of its commands, seconds: the steps of the simulation, which commands wait for. Without any declared,
+/// those would show as `command_jitter`.
+const SQUARE_JITTER_S: f64 = 0.002;
 /// And so long at the beginning, seconds: what is commanded then changes between commands, never at one.
 const FIRST_S: f64 = 0.62;
 
@@ -144,7 +147,7 @@ fn masked(scenario: &mut Scenario, draw: &mut Draw) -> Result<Vec<Injected>, Ben
         own.start = Some(Start { x_m, y_m: -0.5 * SIDE_M, heading_rad: 0.0 });
         own.motion.policy = Policy::Script;
         // A command that comes at another time turns the robot by another angle.
-        own.command_jitter_s = 0.0;
+        own.command_jitter_s = SQUARE_JITTER_S;
         let leg = [
             [SQUARE_SPEED_M_S, 0.0, SIDE_M / SQUARE_SPEED_M_S],
             [0.0, 0.0, CORNER_S],
