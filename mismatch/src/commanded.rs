@@ -109,6 +109,7 @@ fn settled(track: &Track, length_s: f64, plan: &mut Plan<Motion>) -> Vec<(f64, f
 /// As many windows as it takes to cover a time.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
 fn whole_windows(lasted_s: f64, length_s: f64) -> usize {
+    let length_s = if length_s > 0.0 { length_s } else { WINDOW_S };
     (lasted_s / length_s).ceil().max(0.0) as usize
 }
 

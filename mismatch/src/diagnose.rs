@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use pleiad_physics::Effect;
 use pleiad_recording::Recording;
 
 use crate::diagnosis;
@@ -41,6 +42,21 @@ pub struct DiagnoseOptions {
     pub truth: TruthUse,
     /// Whether sightings of landmarks are left out.
     pub without_landmarks: bool,
+    /// Effects that are not tried, as if the catalogue did not have them.
+    pub leave_out: Vec<Effect>,
+    /// Parts of the diagnosis that are left away.
+    pub without: Without,
+}
+
+/// Parts of the diagnosis that can be left away, to see what they are worth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Without {
+    /// Errors count as independent from row to row, not correlated within blocks of time.
+    pub blocks: bool,
+    /// Effects that begin at some time or act in some place only are not looked for.
+    pub scans: bool,
+    /// A finding has no rivals.
+    pub sets: bool,
 }
 
 /// Compares, locates, names, models.

@@ -41,8 +41,11 @@ pub use channel::{Channel, Component, MAX_COMPONENTS};
 pub use compare::{
     ChannelComparison, RobotComparison, command_agitation, compare, end_to_end, residuals, residuals_of,
 };
-pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, diagnose};
-pub use diagnosis::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known, log_likelihood};
+pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, Without, diagnose};
+pub use diagnosis::{
+    Design, DesignColumn, Explained, Interval, KnownFit, KnownParameter, Rival, Structure,
+    acts_on_every_robot, design, explained, fit_known, log_likelihood,
+};
 pub use error::MismatchError;
 pub use evidence::Evidence;
 pub use findings::{

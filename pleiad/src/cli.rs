@@ -5,6 +5,7 @@ mod values;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use pleiad_benchmark::Asked;
 use pleiad_estimation::strategy::StrategyKind;
 use pleiad_sim_peers::scenario::ManoeuvreKind;
 
@@ -32,6 +33,9 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// What physics the nominal model leaves out: where, what, how sure, and the corrected model.
     Diagnose(DiagnoseArgs),
+    /// How good the diagnosis is, where the answers are known.
+    #[command(subcommand)]
+    Benchmark(Benchmark),
     /// What loss and partitions do to each strategy: the table of strategies by fault level.
     Faults(FaultsArgs),
     /// The physics a simulation can leave out: names, parameters, equations.
@@ -231,6 +235,44 @@ pub struct DiagnoseArgs {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// The object of findings.json on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Benchmark {
+    /// The diagnosis on data in which something is concealed: named, missed, invented; beside other methods.
+    Concealed(ConcealedArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct ConcealedArgs {
+    /// How many seeds: recordings of every case of a class.
+    #[arg(long, default_value_t = 1)]
+    pub seeds: u64,
+    /// The first seed.
+    #[arg(long, default_value_t = 1)]
+    pub first_seed: u64,
+    /// Which classes: clean, single, masked, absorbed, cancelling, buried, rare, out_of_catalogue,
+    /// unidentifiable, decoy; with a number of seeds of its own as in clean:100. Default: all.
+    #[arg(long, value_name = "CLASS", num_args = 1.., value_delimiter = ',')]
+    pub class: Vec<Asked>,
+    /// Only cases with one of these in their names, as in single/crab/x1/white/1.
+    #[arg(long, value_name = "TEXT", num_args = 1..)]
+    pub only: Vec<String>,
+    /// Also diagnose without blocks of time, without scans for places and onsets, and without sets.
+    #[arg(long)]
+    pub ablations: bool,
+    /// Leave away the other methods: sparse regression, lasso, joint fit.
+    #[arg(long)]
+    pub no_baselines: bool,
+    /// Take up a run that stopped, in the folder of --out; cases that have a result are not run again.
+    #[arg(long, requires = "out")]
+    pub resume: bool,
+    /// Folder for the sealed answers, the results, summary.json and concealed.md; a new one under runs/ if absent.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// One JSON object on stdout.
     #[arg(long)]
     pub json: bool,
 }

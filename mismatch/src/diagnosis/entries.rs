@@ -7,7 +7,9 @@ use pleiad_estimation::RobotId;
 use pleiad_physics::{Channel as Needed, Effect, EffectInfo, Stage};
 
 use crate::channel::Channel;
+use crate::diagnose::DiagnoseOptions;
 use crate::diagnosis::select::Entry;
+use crate::diagnosis::starts::Placing;
 use crate::diagnosis::term::Whose;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Stretch, Unit};
@@ -18,6 +20,18 @@ use crate::residual::Omission;
 pub(crate) struct Entries {
     pub(crate) entries: Vec<Entry>,
     pub(crate) untestable: Vec<Untestable>,
+}
+
+impl Entries {
+    /// Without what is not to be tried.
+    pub(crate) fn tried(mut self, options: &DiagnoseOptions) -> Self {
+        let placed = |effect: Effect| Placing::of(effect.info()).is_some();
+        let dropped =
+            |effect: Effect| options.leave_out.contains(&effect) || (options.without.scans && placed(effect));
+        self.entries.retain(|(effect, _)| !dropped(*effect));
+        self.untestable.retain(|own| !Effect::from_name(&own.effect).is_some_and(dropped));
+        self
+    }
 }
 
 /// Below this, seconds, there are too few blocks of time for a robust variance.

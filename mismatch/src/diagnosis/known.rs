@@ -182,7 +182,7 @@ pub fn log_likelihood(
 }
 
 /// An effect where the likelihood is greatest beside a fit, of all its starts.
-fn found(units: &[&Unit<'_>], current: &Fit, effect: Effect, whose: Whose) -> Option<Term> {
+pub(crate) fn found(units: &[&Unit<'_>], current: &Fit, effect: Effect, whose: Whose) -> Option<Term> {
     let whites = whites(units, current);
     let candidates = candidates(&[(effect, whose)], units, &current.terms, &current.states).concat();
     let mut scored: Vec<Scored> =
@@ -201,7 +201,7 @@ fn found(units: &[&Unit<'_>], current: &Fit, effect: Effect, whose: Whose) -> Op
 }
 
 /// Values and intervals of every term of a fit.
-fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
+pub(crate) fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
     // Thresholds alone leave nothing that has a derivative.
     let Robust { covariance, quantiles } = robust(units, fit).unwrap_or_else(|| {
         let size = fit.slots.len();
@@ -235,7 +235,7 @@ fn of_mean_known(units: &[&Unit<'_>], fit: &Fit) -> Vec<KnownFit> {
 
 /// Values and intervals of a term; those that its derivatives do not give come from `profile`. The values that
 /// are fitted at a threshold, an onset or a place are as unsure, besides, as they are dragged along with it.
-fn known_fit(
+pub(crate) fn known_fit(
     units: &[&Unit<'_>],
     estimated: &Estimated,
     quantile: &dyn Fn(usize) -> f64,

@@ -11,7 +11,9 @@
 mod candidate;
 mod chi_square;
 mod corrected;
+mod design;
 mod entries;
+mod explained;
 mod fit;
 mod held_out;
 mod known;
@@ -39,6 +41,8 @@ mod unit;
 mod white;
 mod without_truth;
 
+pub use design::{Design, DesignColumn, design};
+pub use explained::{Explained, Rival, Structure, explained};
 pub use known::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known, log_likelihood};
 pub(crate) use mesh::{LOST, STATES, about, carried, gradient};
 pub(crate) use run::run;

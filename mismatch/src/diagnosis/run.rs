@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_estimation::RobotId;
-use pleiad_physics::{Floors, RobotModel};
+use pleiad_physics::{Effect, Floors, RobotModel};
 use pleiad_recording::Recording;
 
 use crate::builtin;
@@ -19,7 +19,7 @@ use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
 use crate::diagnosis::select::{Entry, Pool, Selected, select};
 use crate::diagnosis::series;
-use crate::diagnosis::spread::{self, Spread, SpreadTerm};
+use crate::diagnosis::spread::{self, Spread, SpreadTerm, Swaps};
 use crate::diagnosis::support::{Support, support};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Member, Unit};
@@ -72,11 +72,9 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         .iter()
         .enumerate()
         .flat_map(|(index, own)| own.models.iter().map(move |(&robot, model)| (index, own, robot, model)))
-        .map(|(index, own, robot, model)| {
-            Unit::new(&own.evidence, index, vec![member(own.recording, robot, model)])
-        })
+        .map(|(index, own, robot, model)| unit(index, own, robot, model))
         .collect();
-    let swaps = spread::swaps(&mut all);
+    let swaps = begun(&mut all, options);
     let fitted: Vec<&Unit<'_>> = all.iter().filter(|unit| !prepared[unit.recording].tested).collect();
     let enough = |unit: &&Unit<'_>| lasting_s(&fitted, unit.robot()) >= SHORT_S;
     let units: Vec<&Unit<'_>> =
@@ -90,7 +88,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     } else {
         (alone.clone(), tests_alone.clone())
     };
-    let mut entries = entries(&fitted);
+    let mut entries = entries(&fitted).tried(options);
     let tried = entries.entries.len() + entries.untestable.len();
     let spread_entries = spread::take(&mut entries, &alone);
 
@@ -119,7 +117,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let scored = pool.scored(&units, &entries.entries, &fit);
     entries.untestable.extend(hidden(&alone, &entries.entries, &fit, &pool));
     let groups = groups(&units, &fit.terms);
-    let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
+    let mut judgements = judgements(&units, &tests, &fit, &groups, (&pool, options.without.sets), count);
     let fit_alone = if by_reference { alone_under(&alone, &fit) } else { Some(fit.clone()) };
     let spread = fit_alone.as_ref().map_or_else(Spread::default, |fit| {
         spread::spread(&alone, &tests_alone, fit, &spread_entries, &swaps, count)
@@ -185,6 +183,17 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     Ok(Diagnosis { findings, plots, corrected })
 }
 
+/// What comes before anything is fitted: names that are exchanged.
+fn begun(all: &mut [Unit<'_>], options: &DiagnoseOptions) -> Swaps {
+    if options.without.blocks {
+        all.iter_mut().for_each(Unit::make_rows_blocks);
+    }
+    if options.leave_out.contains(&Effect::LandmarkIdentitySwap) {
+        return Swaps::default();
+    }
+    spread::swaps(all)
+}
+
 /// For each recording whether it is tested on; `None` if it is not used.
 fn roles(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Vec<Option<bool>>, MismatchError> {
     for name in options.fit_on.iter().chain(&options.test_on) {
@@ -204,6 +213,16 @@ fn roles(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Vec<Opti
         return Err(MismatchError::NothingToFit { tested_on: options.test_on.clone() });
     }
     Ok(roles)
+}
+
+/// A robot by itself.
+pub(crate) fn unit<'a>(
+    index: usize,
+    own: &'a Prepared<'a>,
+    robot: RobotId,
+    model: &RobotModel<f64>,
+) -> Unit<'a> {
+    Unit::new(&own.evidence, index, vec![member(own.recording, robot, model)])
 }
 
 /// A robot with what its recording declares.
@@ -254,12 +273,15 @@ fn judgements(
     tests: &[&Unit<'_>],
     fit: &Fit,
     groups: &[Vec<usize>],
-    pool: &Pool,
+    (pool, alone): (&Pool, bool),
     count: usize,
 ) -> Vec<Judgement> {
     let mut all = Vec::new();
     for group in groups {
-        let Some(support) = support(units, fit, group, pool, count) else { continue };
+        let Some(mut support) = support(units, fit, group, pool, count) else { continue };
+        if alone {
+            support.members.truncate(group.len());
+        }
         let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
         let gain = if tests.is_empty() {
             cross_fitted(&acting, &support.with, &support.without)

@@ -270,6 +270,12 @@ impl<'a> Unit<'a> {
         self.members.iter().filter(|member| term.acts_on(member.robot))
     }
 
+    /// Lets every element be a block of its own: errors count as independent.
+    pub(crate) fn make_rows_blocks(&mut self) {
+        self.blocks = self.rows.len();
+        self.block_of = (0..self.blocks).collect();
+    }
+
     pub(crate) fn stretch(&self, channel: Channel) -> Option<&Stretch> {
         self.stretches.iter().find(|stretch| stretch.channel == channel && stretch.rows > 0)
     }

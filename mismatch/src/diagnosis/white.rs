@@ -57,6 +57,11 @@ impl<'u, 'a> White<'u, 'a> {
         }
         all
     }
+
+    /// What a column predicts, in sigmas, per stretch.
+    pub(crate) fn of(&self, column: &Column) -> Vec<Option<Vec<f64>>> {
+        self.all_of(std::slice::from_ref(column)).pop().unwrap_or_default()
+    }
 }
 
 /// A hypothesis of one step beyond a fit.

@@ -1,6 +1,7 @@
 //! The subcommands.
 
 mod agent;
+mod concealed;
 mod coordinator;
 mod demo;
 mod diagnose;
@@ -17,7 +18,7 @@ mod simulate;
 
 pub use runner::Survived;
 
-use crate::cli::Command;
+use crate::cli::{Benchmark, Command};
 
 /// Runs a subcommand to its end.
 pub fn run(command: Command) -> anyhow::Result<()> {
@@ -28,6 +29,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Observability(args) => observability::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
+        Command::Benchmark(Benchmark::Concealed(args)) => concealed::run(&args),
         Command::Faults(args) => faults::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Agent(args) => agent::run(&args),

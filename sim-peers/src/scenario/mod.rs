@@ -19,8 +19,8 @@ pub use declared::Declared;
 pub use drive::{DriveKind, DriveSettings};
 pub use manoeuvre::{ManoeuvreKind, UnknownManoeuvre};
 pub use settings::{
-    Direction, Gps, Gyro, Heading, Motion, MotionNoise, Odometry, OdometryKind, Policy, PriorSettings,
-    RelativeKind, RelativeSensor, RobotSettings, See, Start,
+    Direction, Gps, Gyro, Heading, LastingSlip, Motion, MotionNoise, Odometry, OdometryKind, Policy,
+    PriorSettings, RelativeKind, RelativeSensor, RobotSettings, See, Start,
 };
 
 /// A simulation to run: complete, with the defaults already applied to every robot.

@@ -51,6 +51,9 @@ pub struct RobotSettings {
     pub heading: Heading,
     /// What it sees of other robots and landmarks.
     pub relative: RelativeSensor,
+    /// Slip, gyro, GPS and heading have noise of Student's distribution with so many degrees of freedom, above
+    /// 2, and the standard deviations given; 0: normal.
+    pub noise_degrees_of_freedom: f64,
 }
 
 impl Default for RobotSettings {
@@ -75,6 +78,7 @@ impl Default for RobotSettings {
             gps: Gps::default(),
             heading: Heading::default(),
             relative: RelativeSensor::default(),
+            noise_degrees_of_freedom: 0.0,
         }
     }
 }
@@ -206,11 +210,49 @@ pub struct Odometry {
     pub rate_hz: f64,
     /// How the body departs from what the wheels did.
     pub noise: MotionNoise,
+    /// The same, from one instant to the next not at random.
+    pub lasting: LastingSlip,
 }
 
 impl Default for Odometry {
     fn default() -> Self {
-        Self { kind: OdometryKind::Velocity, rate_hz: 25.0, noise: MotionNoise::default() }
+        Self {
+            kind: OdometryKind::Velocity,
+            rate_hz: 25.0,
+            noise: MotionNoise::default(),
+            lasting: LastingSlip::default(),
+        }
+    }
+}
+
+/// Coloured slip: velocities of the body besides those of its wheels, each an Ornstein-Uhlenbeck process
+/// (`uhlenbeck1930`) with this standard deviation and one time constant; the autocovariance is
+/// `sigma^2 exp(-|t| / time_constant_s)`. While the wheels stand still so does the body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LastingSlip {
+    /// Forward, m/s.
+    pub speed_m_s: f64,
+    /// Sideways, m/s.
+    pub lateral_m_s: f64,
+    /// Yaw, rad/s.
+    pub yaw_rad_s: f64,
+    /// Time over which it is forgotten, seconds.
+    pub time_constant_s: f64,
+}
+
+impl Default for LastingSlip {
+    fn default() -> Self {
+        Self { speed_m_s: 0.0, lateral_m_s: 0.0, yaw_rad_s: 0.0, time_constant_s: 1.0 }
+    }
+}
+
+impl LastingSlip {
+    /// Variances of the displacement `(x, y, yaw)` over `duration_s` seconds, m^2, m^2, rad^2.
+    pub fn variance(&self, duration_s: f64) -> [f64; 3] {
+        let spans = duration_s / self.time_constant_s;
+        let factor = 2.0 * self.time_constant_s.powi(2) * (spans - 1.0 + (-spans).exp());
+        [self.speed_m_s, self.lateral_m_s, self.yaw_rad_s].map(|sigma| sigma * sigma * factor)
     }
 }
 

@@ -157,6 +157,19 @@ impl Check {
         self.not_negative("odometry.noise.yaw_rad_per_sqrt_s", noise.yaw_rad_per_sqrt_s)?;
         self.not_negative("odometry.noise.speed_m_per_sqrt_m", noise.speed_m_per_sqrt_m)?;
         self.not_negative("odometry.noise.yaw_rad_per_sqrt_rad", noise.yaw_rad_per_sqrt_rad)?;
+        let lasting = &settings.odometry.lasting;
+        self.not_negative("odometry.lasting.speed_m_s", lasting.speed_m_s)?;
+        self.not_negative("odometry.lasting.lateral_m_s", lasting.lateral_m_s)?;
+        self.not_negative("odometry.lasting.yaw_rad_s", lasting.yaw_rad_s)?;
+        self.above_zero("odometry.lasting.time_constant_s", lasting.time_constant_s)?;
+        let degrees = settings.noise_degrees_of_freedom;
+        let known = degrees == 0.0 || (degrees.is_finite() && degrees > 2.0);
+        self.require(
+            known,
+            "noise_degrees_of_freedom",
+            degrees,
+            "a finite number above 2, or 0 for normal noise",
+        )?;
         self.rate("gyro.rate_hz", settings.gyro.rate_hz, 0.0)?;
         self.above_zero("gyro.sigma_rad_s", settings.gyro.sigma_rad_s)?;
         self.finite("gyro.bias_rad_s", settings.gyro.bias_rad_s)?;

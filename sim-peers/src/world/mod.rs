@@ -5,7 +5,7 @@
 //! which they say `U = exp((v dt, 0, w dt))` it moves by `U exp(n)`, `n ~ N(0, Q dt)` white from tick to
 //! tick and independent of everything else; odometry reports `U` without error. So a filter that integrates
 //! the reports and adds `Ad_N Q dt Ad_N^T` (N after the step) has the law of this world, but for changes of
-//! speed within a tick (`docs/scenario.md`). Within a tick `n` grows as a Brownian motion, whose variance is
+//! speed within a tick (`docs/scenario.md`); slip that lasts is none of its law. Within a tick `n` grows as a Brownian motion, whose variance is
 //! the linear `C(t)` such a filter interpolates.
 
 mod connectivity;
@@ -17,6 +17,7 @@ mod policy;
 mod random;
 mod sensors;
 mod sighting;
+mod slip;
 mod steering;
 mod track;
 mod vehicle;

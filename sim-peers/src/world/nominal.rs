@@ -56,7 +56,9 @@ pub(super) fn nominal(scenario: &Scenario) -> Nominal {
 /// Standard deviations over one second of driving at cruising speed and full turn.
 fn one_second(robot: &RobotSettings) -> [f64; 3] {
     let motion = &robot.motion;
-    robot.odometry.noise.variance(motion.speed_m_s, motion.max_yaw_rate_rad_s, 1.0).map(f64::sqrt)
+    let white = robot.odometry.noise.variance(motion.speed_m_s, motion.max_yaw_rate_rad_s, 1.0);
+    let lasting = robot.odometry.lasting.variance(1.0);
+    [0, 1, 2].map(|axis| (white[axis] + lasting[axis]).sqrt())
 }
 
 /// What would be declared of a robot if nothing were mis-tuned.

@@ -35,6 +35,10 @@ pub(super) enum Channel {
     GyroChances = 15,
     /// When a robot's commands take effect.
     Jitter = 16,
+    /// Slip that lasts.
+    Lasting = 17,
+    /// The spread of heavy-tailed noise of a robot's own channels: an item per channel.
+    OwnTails = 18,
 }
 
 /// Ends every key, so that no other use of a bare seed shares a stream with the world.
@@ -75,6 +79,29 @@ pub(super) fn student_divisor(stream: &mut ChaCha12Rng, degrees_of_freedom: f64)
     match ChiSquared::new(degrees_of_freedom) {
         Ok(spread) if degrees_of_freedom.is_finite() => (spread.sample(stream) / degrees_of_freedom).sqrt(),
         _ => 1.0,
+    }
+}
+
+/// What normal noise is multiplied by, draw by draw, to have Student's distribution and the same standard
+/// deviation.
+pub(super) struct Tails {
+    degrees_of_freedom: f64,
+    stream: ChaCha12Rng,
+}
+
+impl Tails {
+    /// Of a channel of a robot; 0 degrees of freedom: always one.
+    pub(super) fn new(seed: Seed, robot: RobotId, channel: Channel, degrees_of_freedom: f64) -> Self {
+        Self { degrees_of_freedom, stream: seed.item_stream(robot, Channel::OwnTails, channel as u64) }
+    }
+
+    pub(super) fn factor(&mut self) -> f64 {
+        if self.degrees_of_freedom == 0.0 {
+            return 1.0;
+        }
+        // The variance of Student's distribution is n / (n - 2).
+        let spread = ((self.degrees_of_freedom - 2.0) / self.degrees_of_freedom).sqrt();
+        spread / student_divisor(&mut self.stream, self.degrees_of_freedom)
     }
 }
 

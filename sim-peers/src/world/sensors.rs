@@ -13,7 +13,7 @@ use pleiad_recording::{Command, SteerSample, TruthSample};
 use super::OBSERVATIONS_FROM_S;
 use super::drive::Drive;
 use super::model::{Firmware, true_model};
-use super::random::{Channel, Seed, chance, normal};
+use super::random::{Channel, Seed, Tails, chance, normal};
 use super::track::{Track, wrapped};
 use crate::scenario::{DriveKind, OdometryKind, RobotSettings};
 
@@ -57,6 +57,11 @@ impl<'a> Channels<'a> {
     /// What the hooks of effects look at: the true motion at an instant.
     pub(super) fn context(&self, time: Timestamp) -> Context<'_, f64> {
         Context::new(&self.model.nominal, time.seconds(), self.track().motion_at(time))
+    }
+
+    /// The tails of a channel's noise.
+    fn tails(&self, channel: Channel) -> Tails {
+        Tails::new(self.seed, self.robot, channel, self.settings.noise_degrees_of_freedom)
     }
 
     /// The stamp that the robot's clock gives to an instant.
@@ -135,6 +140,7 @@ impl<'a> Channels<'a> {
     pub(super) fn gyro(&self) -> Vec<Sample> {
         let gyro = &self.settings.gyro;
         let mut stream = self.seed.stream(self.robot, Channel::Gyro);
+        let mut tails = self.tails(Channel::Gyro);
         let mut chances = self.seed.stream(self.robot, Channel::GyroChances);
         let mut walk_rad_s = 0.0;
         self.instants(Channel::Gyro, gyro.rate_hz, OBSERVATIONS_FROM_S)
@@ -144,7 +150,7 @@ impl<'a> Channels<'a> {
                 context.chance = chance(&mut chances);
                 let rate = sensors::gyro(&self.model, &context, &mut walk_rad_s);
                 let sigma = sensors::noise(&self.model, &context, 0.0, 0.0).gyro_sigma_rad_s;
-                let yaw_rate_rad_s = rate + sigma * normal(&mut stream);
+                let yaw_rate_rad_s = rate + sigma * tails.factor() * normal(&mut stream);
                 Sample { time: self.stamp(time), reading: Reading::Gyro { yaw_rate_rad_s } }
             })
             .collect()
@@ -155,13 +161,14 @@ impl<'a> Channels<'a> {
     pub(super) fn gps(&self) -> Vec<Sample> {
         let gps = &self.settings.gps;
         let mut stream = self.seed.stream(self.robot, Channel::Gps);
+        let mut tails = self.tails(Channel::Gps);
         let received = |time: Timestamp| {
             let within = |window: &[f64; 2]| (window[0]..window[1]).contains(&time.seconds());
             gps.windows_s.is_empty() || gps.windows_s.iter().any(within)
         };
         self.instants(Channel::Gps, gps.rate_hz, OBSERVATIONS_FROM_S)
             .filter_map(|time| {
-                let noise = [(); 2].map(|()| gps.sigma_m * normal(&mut stream));
+                let noise = [(); 2].map(|()| gps.sigma_m * tails.factor() * normal(&mut stream));
                 let how = sensors::gps_reading(&self.model, &self.context(time));
                 let pose = self.track().unwrapped_at(time.plus_seconds(-how.latency_s));
                 let [x, y] = sensors::antenna(&how, &pose);
@@ -175,9 +182,10 @@ impl<'a> Channels<'a> {
     pub(super) fn heading(&self) -> Vec<Sample> {
         let heading = &self.settings.heading;
         let mut stream = self.seed.stream(self.robot, Channel::Heading);
+        let mut tails = self.tails(Channel::Heading);
         self.instants(Channel::Heading, heading.rate_hz, OBSERVATIONS_FROM_S)
             .map(|time| {
-                let noise = heading.sigma_rad * normal(&mut stream);
+                let noise = heading.sigma_rad * tails.factor() * normal(&mut stream);
                 let context = self.context(time);
                 let read = sensors::heading_of(&self.model, &context, context.heading_rad());
                 let reading = Reading::Heading { heading_rad: wrap_angle(read + noise) };

@@ -4,7 +4,7 @@
 //! and place act as in the middle of a step. Predictions of the same chain take the samples of the encoders
 //! as their steps.
 
-use pleiad_estimation::geometry::{Vector2, Vector3};
+use pleiad_estimation::geometry::Vector2;
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_physics::chain::actuator::{self, ActuatorState, Scheduled, schedule_next, turn};
 use pleiad_physics::chain::body::{BodyState, increment};
@@ -15,7 +15,8 @@ use rand_chacha::ChaCha12Rng;
 use super::drive::Drive;
 use super::model::{Firmware, true_model};
 use super::policy::{Driver, Twist, View};
-use super::random::{Channel, Seed, chance, normal, uniform};
+use super::random::{Channel, Seed, chance, uniform};
+use super::slip::Slip;
 use super::steering::Steering;
 use super::track::{Track, wrapped};
 use crate::Scenario;
@@ -51,7 +52,7 @@ pub(super) struct Vehicle<'a> {
     model: RobotModel<f64>,
     firmware: Firmware,
     driver: Driver,
-    slip: ChaCha12Rng,
+    slip: Slip,
     chances: ChaCha12Rng,
     jitter: ChaCha12Rng,
     /// Time of the first tick, seconds.
@@ -92,7 +93,7 @@ impl<'a> Vehicle<'a> {
             model: true_model(settings),
             firmware: Firmware::of(settings),
             driver: Driver::new(scenario, robot, start, seed.stream(robot, Channel::Waypoints)),
-            slip: seed.stream(robot, Channel::Slip),
+            slip: Slip::new(seed, robot, settings),
             chances: seed.stream(robot, Channel::Commands),
             jitter: seed.stream(robot, Channel::Jitter),
             first_s,
@@ -237,20 +238,18 @@ impl<'a> Vehicle<'a> {
             .map(|nearest| [nearest.x, nearest.y])
     }
 
-    /// Adds the Brownian slip of a tick to its poses. The variates are drawn even where their variance is
-    /// zero, so that standing still does not shift what comes later.
+    /// Adds the slip of a tick to its poses.
     fn slip(&mut self, duration_s: f64) {
         let before = self.wheel_angles.last().copied().unwrap_or_default();
         let turned = [0, 1].map(|wheel| self.motion.wheel_angle_rad[wheel] - before[wheel]);
         let (forward_m, turn_rad) = self.firmware.moved(turned, self.steering.angle_rad());
         let variance = self.settings.odometry.noise.variance(forward_m, turn_rad, duration_s);
-        let sigmas = variance.map(|whole| (whole / self.poses.len() as f64).sqrt());
-        let mut sum = Vector3::zeros();
-        for pose in &mut self.poses {
-            for (component, sigma) in sum.iter_mut().zip(sigmas) {
-                *component += sigma * normal(&mut self.slip);
-            }
-            *pose = pose.compose(&Pose::exp(sum.x, sum.y, sum.z));
+        let knots = self.poses.len();
+        let sigmas = variance.map(|whole| (whole / knots as f64).sqrt());
+        let moving = turned.iter().any(|angle| *angle != 0.0);
+        let slips = self.slip.tick(knots, sigmas, duration_s / knots as f64, moving);
+        for (pose, slip) in self.poses.iter_mut().zip(slips) {
+            *pose = pose.compose(&Pose::exp(slip.x, slip.y, slip.z));
         }
     }
 }

@@ -2,13 +2,14 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "demo",
     "run",
     "replay",
     "observability",
     "simulate",
     "diagnose",
+    "benchmark",
     "faults",
     "effects",
     "agent",

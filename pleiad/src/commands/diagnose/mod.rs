@@ -40,6 +40,7 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
         test_on: chosen.test_on,
         truth,
         without_landmarks: args.without_landmarks,
+        ..DiagnoseOptions::default()
     };
     let mut diagnosis = diagnose(&recordings, &options)?;
     diagnosis.findings.notes.extend(chosen.notes);
