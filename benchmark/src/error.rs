@@ -97,7 +97,7 @@ pub enum BenchmarkError {
         /// The case.
         id: String,
         /// What the simulator said.
-        source: pleiad_sim_peers::Error,
+        source: Box<pleiad_sim_peers::Error>,
     },
     /// A recording that cannot be diagnosed.
     #[error("{id}: {source}")]

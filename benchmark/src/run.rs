@@ -104,15 +104,13 @@ pub fn run(options: &Options, tell: &mut dyn FnMut(&str)) -> Result<Outcome, Ben
     let resumed = known.len();
     let mut all = Vec::with_capacity(plans.len());
     for (index, plan) in plans.iter().enumerate() {
-        let result = match known.remove(&plan.id) {
-            Some(result) => result,
-            None => {
-                let result = one(plan, options)?;
-                results::append(&file, &result)?;
-                tell(&line(index, plans.len(), &result));
-                result
-            }
-        };
+        if let Some(result) = known.remove(&plan.id) {
+            all.push(result);
+            continue;
+        }
+        let result = one(plan, options)?;
+        results::append(&file, &result)?;
+        tell(&line(index, plans.len(), &result));
         all.push(result);
     }
     // The answers as they are now are those that were sealed.
@@ -176,7 +174,8 @@ pub const ABLATIONS: [(&str, Without); 3] = [
 
 fn recorded(case: &Case, scenario: &Scenario, seed: u64) -> Result<Recording, BenchmarkError> {
     let id = || case.answer.id.clone();
-    let run = simulate(scenario, seed).map_err(|source| BenchmarkError::Simulation { id: id(), source })?;
+    let run = simulate(scenario, seed)
+        .map_err(|error| BenchmarkError::Simulation { id: id(), source: Box::new(error) })?;
     let mut recording = run.recording;
     // Nothing of the answer is in what the tool is given, the name included.
     "recording".clone_into(&mut recording.name);

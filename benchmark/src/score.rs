@@ -35,6 +35,7 @@ pub struct Scored {
 }
 
 /// What became of an effect that was injected.
+#[allow(clippy::struct_excessive_bools, reason = "each is counted on its own")]
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Match {
     /// The effect.
@@ -111,8 +112,8 @@ fn matched(answer: &Answer, findings: &[Finding]) -> Vec<Option<usize>> {
             }
             let fits = |finding: &Finding| {
                 let named = finding.effect.as_deref() == Some(own.effect.as_str());
-                let member = finding.support_set.len() <= LARGEST_SET
-                    && finding.support_set.iter().any(|member| *member == own.effect);
+                let member =
+                    finding.support_set.len() <= LARGEST_SET && finding.support_set.contains(&own.effect);
                 finding.robots == own.robots && if by_name { named } else { member }
             };
             owners[position] =
@@ -148,11 +149,11 @@ fn one(own: &Injected, found: Option<&Finding>, all: &[Finding]) -> Match {
     result
 }
 
+/// A value with its 95 % interval, if it has one.
+pub type Found = (f64, Option<[f64; 2]>);
+
 /// The sizes of an effect that was injected, as they were found.
-pub fn parameters(
-    own: &Injected,
-    found: &dyn Fn(&str) -> Option<(f64, Option<[f64; 2]>)>,
-) -> Vec<ParameterError> {
+pub fn parameters(own: &Injected, found: &dyn Fn(&str) -> Option<Found>) -> Vec<ParameterError> {
     let Some(effect) = Effect::from_name(&own.effect) else { return Vec::new() };
     let mut all = Vec::new();
     for parameter in effect.info().parameters {

@@ -245,6 +245,7 @@ pub enum Benchmark {
     Concealed(ConcealedArgs),
 }
 
+#[allow(clippy::struct_excessive_bools, reason = "switches of the command line")]
 #[derive(Debug, Args)]
 pub struct ConcealedArgs {
     /// How many seeds: recordings of every case of a class.

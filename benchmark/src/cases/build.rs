@@ -97,7 +97,7 @@ pub(super) fn build(plan: &Plan) -> Result<Case, BenchmarkError> {
 
 /// The scenario without noise of the slip, under the name of a case.
 pub(super) fn base(id: &str) -> Result<Scenario, BenchmarkError> {
-    let source = |source| BenchmarkError::Simulation { id: id.to_owned(), source };
+    let source = |error| BenchmarkError::Simulation { id: id.to_owned(), source: Box::new(error) };
     let mut scenario = Scenario::from_toml(SCENARIO, "concealed.toml").map_err(source)?;
     id.clone_into(&mut scenario.name);
     Ok(scenario)

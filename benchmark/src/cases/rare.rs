@@ -38,7 +38,8 @@ pub(super) fn rare(
         return inject(scenario, effect, &values, robot, Some([from_s, from_s + LASTS * duration_s]));
     }
     if let Some((first, _)) = effect.info().parameter("region_m.x_min") {
-        let source = |source| BenchmarkError::Simulation { id: scenario.name.clone(), source };
+        let source =
+            |error| BenchmarkError::Simulation { id: scenario.name.clone(), source: Box::new(error) };
         // The path with the effect is another, but little: it acts for seconds.
         let run = simulate(scenario, seed).map_err(source)?;
         let region = run.tracks.get(&robot).and_then(|track| place(track, duration_s, draw));

@@ -29,10 +29,12 @@ pub struct Point {
     pub y: Share,
 }
 
+/// What recordings are put in order by.
+type Score = fn(&CaseResult) -> f64;
+
 /// All curves that there are results for.
 pub(super) fn curves(results: &[CaseResult]) -> Vec<Curve> {
     let mut all = Vec::new();
-    type Score = fn(&CaseResult) -> f64;
     let scores: [(&str, Score); 2] =
         [("minus log10 p", |own| own.tool.evidence), ("gain in standard errors", |own| own.tool.gain_z)];
     for (name, score) in scores {
@@ -46,7 +48,7 @@ pub(super) fn curves(results: &[CaseResult]) -> Vec<Curve> {
 
 /// Found are recordings with a single effect, at any size, whose strongest finding is above a threshold; false
 /// alarms are clean ones.
-fn roc(name: &str, results: &[CaseResult], score: fn(&CaseResult) -> f64) -> Option<Curve> {
+fn roc(name: &str, results: &[CaseResult], score: Score) -> Option<Curve> {
     let of = |class: Class| results.iter().filter(move |own| own.class == class).map(score);
     let mut thresholds: Vec<f64> = of(Class::Clean).chain(of(Class::Single)).collect();
     thresholds.sort_by(f64::total_cmp);
