@@ -12,7 +12,8 @@ mod summary;
 use std::path::Path;
 
 use anyhow::Context;
-use pleiad_mismatch::{DiagnoseOptions, TruthUse, diagnose};
+use pleiad_benchmark::manoeuvre::{advice, proposals};
+use pleiad_mismatch::{DiagnoseOptions, Findings, TruthUse, diagnose};
 use pleiad_recording::{Nominal, ReadOptions, Recording, read_model};
 use pleiad_report::{diagnose_report, write_summary};
 
@@ -44,6 +45,8 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
     };
     let mut diagnosis = diagnose(&recordings, &options)?;
     diagnosis.findings.notes.extend(chosen.notes);
+    spinner.set_message("looking for manoeuvres that tell rivals apart");
+    advise(&recordings, &mut diagnosis.findings, &options);
     sentences::fill_summaries(&mut diagnosis.findings);
     spinner.set_message("writing the report");
     let out = match asked {
@@ -56,6 +59,17 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
     diagnose_report(&report)?.write(&out.join("report.html"))?;
     spinner.finish_and_clear();
     output::print(args.json, &diagnosis.findings, &summary::text(&diagnosis.findings, &out))
+}
+
+/// Puts the manoeuvre that tells the rivals of a finding apart in the place of the catalogue's advice, as far as the
+/// recordings declare what the robots are.
+fn advise(recordings: &[Recording], findings: &mut Findings, options: &DiagnoseOptions) {
+    for finding in &mut findings.findings {
+        let all = recordings.iter().find_map(|recording| proposals(recording, finding, options));
+        if let (Some(all), Some(known)) = (all, &finding.manoeuvre) {
+            finding.manoeuvre = Some(advice(&all, known));
+        }
+    }
 }
 
 fn model(path: &Path) -> anyhow::Result<Nominal> {
