@@ -23,6 +23,7 @@ mod mesh;
 mod mesh_filter;
 mod naming;
 mod noise;
+mod pairs;
 mod power;
 mod profile;
 mod refine;
