@@ -2,7 +2,7 @@
 
 use pleiad_estimation::fact::{Absolute, Body, Boot, Continuation, NoiseRef, Observation, Profile, Quantity};
 use pleiad_estimation::symmetric::Symmetric3;
-use pleiad_estimation::{Pose2, Timestamp};
+use pleiad_estimation::{BootIndex, Pose2, Timestamp};
 
 use super::{Node, Notice};
 
@@ -18,7 +18,7 @@ impl Node {
         let index = self.next_boot().max(joined.unwrap_or_default()).max(self.first_of_stay());
         if joined.is_some_and(|boot| self.first_of_stay() < boot) {
             // Its eviction was lost with the others' disks; what it has said is asked for as after that of its own.
-            self.lived_boots.clear();
+            self.forget_past();
         }
         let place = self.ledger.settle().member(self.config.robot).map(|member| member.boot);
         let continuation = self.segments.last().map(|(previous, trajectory)| {
@@ -38,6 +38,7 @@ impl Node {
             (None, None) => Pose2::identity(),
         };
         let odom = self.odom_of(&Boot { time, nonce: 0, configuration: 0, nominal, continuation });
+        self.membership.lost_disk |= self.segments.last().is_none() && index > BootIndex(0);
         self.lived = true;
         self.lived_boots.insert(index);
         self.rebased = None;

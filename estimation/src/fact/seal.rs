@@ -38,6 +38,16 @@ pub struct Ballot {
     pub robot: RobotId,
 }
 
+/// Stands for the length of a log that is over, accounted for and forgotten, as all before it of its robot are.
+pub const WHOLE: u64 = u64::MAX;
+
+/// How much of a log a list says is held or accepted.
+pub fn length_of(lengths: &[(LogId, u64)], log: LogId) -> Option<u64> {
+    let whole = |of: LogId, length| length == WHOLE && of.robot == log.robot && log.boot <= of.boot;
+    let stated = lengths.iter().filter(|(of, length)| *of == log || whole(*of, *length));
+    stated.map(|(_, length)| *length).max()
+}
+
 /// A vote on who belongs to the team from now on. The robot whose ballot it is asks by promising itself,
 /// proposes by accepting first, and the others follow.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,7 +61,7 @@ pub struct Vote {
     pub accepted: bool,
     /// Members to be evicted, ascending.
     pub removed: Vec<RobotId>,
-    /// How much of their logs is accepted, ascending. A promise relies on nothing beyond.
+    /// How much of their logs is accepted, ascending, see [`length_of`]. A promise relies on nothing beyond.
     pub held: Vec<(LogId, u64)>,
     /// Robots to be admitted, and from which boot on, ascending.
     pub added: Vec<(RobotId, BootIndex)>,

@@ -11,7 +11,7 @@ use super::counts::FactCounts;
 use super::rules::{self, Closure, Standing};
 use super::views::{Term, Views};
 use super::{Ledger, Log};
-use crate::fact::{Entry, EntryId, Fingerprint, LogId, Seal, Vote};
+use crate::fact::{Entry, EntryId, Fingerprint, LogId, Seal, Vote, WHOLE, length_of};
 use crate::fold::FoldConfig;
 use crate::joint::Joint;
 use crate::{BootIndex, RobotId, Timestamp};
@@ -46,6 +46,12 @@ pub(super) struct Decision {
 impl Ledger {
     /// Empty, of one robot of a team that closes its past.
     pub fn closing(config: FoldConfig, closure: Closure, owner: RobotId) -> Self {
+        let base = Self::first_base(&config, &closure);
+        Self::from_checkpoint(config, closure, owner, base)
+    }
+
+    /// What a ledger rests on that knows nothing.
+    fn first_base(config: &FoldConfig, closure: &Closure) -> Checkpoint {
         let terms = closure.members.iter().map(|robot| Term {
             robot: *robot,
             from: Timestamp::MIN,
@@ -53,9 +59,9 @@ impl Ledger {
             until: None,
             limits: Vec::new(),
         });
-        let base = Checkpoint {
+        Checkpoint {
             time: Timestamp::MIN,
-            configuration: configuration(&config, &closure),
+            configuration: configuration(config, closure),
             joint: Joint::new(config.form),
             logs: BTreeMap::new(),
             floors: BTreeMap::new(),
@@ -65,8 +71,7 @@ impl Ledger {
             views: Views { epoch: 0, terms: terms.collect(), votes: BTreeMap::new() },
             open: BTreeMap::new(),
             counts: FactCounts::default(),
-        };
-        Self::from_checkpoint(config, closure, owner, base)
+        }
     }
 
     /// The ledger of a robot that knows nothing but a snapshot. It must have been made under the same
@@ -84,7 +89,7 @@ impl Ledger {
         let forgotten =
             |log: &LogId| checkpoint.floors.get(&log.robot).is_some_and(|floor| log.boot < *floor);
         for (log, held) in checkpoint.views.terms.iter().flat_map(|term| &term.limits) {
-            if !forgotten(log) {
+            if !forgotten(log) && *held != WHOLE {
                 ledger.logs.entry(*log).or_default().end_at(*held);
             }
         }
@@ -130,13 +135,17 @@ impl Ledger {
         self.closing.as_ref().map(|closing| &closing.base)
     }
 
-    /// Rests on a peer's snapshot from now on; what is held beyond it is kept.
-    pub fn take_over(&mut self, checkpoint: Checkpoint) {
-        let Some(closing) = &self.closing else { return };
+    /// Rests on a peer's snapshot from now on; what is held beyond it is kept. `false` if it is known here that
+    /// the snapshot counts words of someone evicted that were not accepted: then nothing changes.
+    pub fn take_over(&mut self, checkpoint: Checkpoint) -> bool {
+        let Some(closing) = &self.closing else { return false };
         let (closure, owner) = (closing.closure.clone(), closing.owner);
         let mut fresh = Self::from_checkpoint(self.config, closure, owner, checkpoint);
         for entry in self.by_stay().into_iter().flat_map(|(_, log)| log.all()) {
             fresh.insert(entry.clone());
+        }
+        if fresh.is_contradicted() {
+            return false;
         }
         fresh.quarantined = std::mem::take(&mut self.quarantined);
         #[cfg(feature = "planted")]
@@ -144,6 +153,22 @@ impl Ledger {
             fresh.planted = self.planted;
         }
         *self = fresh;
+        true
+    }
+
+    /// Whether the snapshot it rests on counts words of someone evicted that were not accepted. Only who was
+    /// evicted, or has lost his disk, comes to that: all others have said what they rely on before it was
+    /// decided.
+    pub fn is_contradicted(&self) -> bool {
+        self.closing.as_ref().is_some_and(|closing| closing.contradicted)
+    }
+
+    /// Rests on nothing; what is held is kept.
+    pub fn drop_base(&mut self) {
+        if let Some(closing) = &self.closing {
+            let base = Self::first_base(&self.config, &closing.closure);
+            self.take_over(base);
+        }
     }
 
     /// Whether a log is over and forgotten.
@@ -165,12 +190,6 @@ impl Ledger {
         logs.map(|(id, log)| (*id, log.held()))
     }
 
-    /// Whether the snapshot it rests on counts words of someone evicted that were not accepted. Members never
-    /// come to that: they have said what they rely on before it was decided.
-    pub fn is_contradicted(&self) -> bool {
-        self.closing.as_ref().is_some_and(|closing| closing.contradicted)
-    }
-
     /// Whether a change is decided that cannot take effect here, because entries that it accepts are missing.
     pub fn lacks_accepted(&self) -> bool {
         let decided = self.closing.as_ref().and_then(|closing| closing.views.decided());
@@ -179,6 +198,13 @@ impl Ledger {
 
     /// Whether all that is accepted of a log is held; its author may have said that it ends earlier.
     fn holds_accepted(&self, log: LogId, held: u64) -> bool {
+        if held == WHOLE {
+            let stay = self.views().into_iter().flat_map(Views::active).find(|term| term.robot == log.robot);
+            let known = self.logs.keys().filter(|id| id.robot == log.robot && id.boot <= log.boot).copied();
+            let of_stay = stay.map_or(log.boot.0, |term| term.boot.0)..=log.boot.0;
+            let of_stay = of_stay.map(|boot| LogId { robot: log.robot, boot: BootIndex(boot) });
+            return known.chain(of_stay).all(|id| self.is_complete(id));
+        }
         self.holds(log, rules::needed(held, self.logs.get(&log).and_then(|log| log.limit)))
     }
 
@@ -222,11 +248,20 @@ impl Ledger {
         // Whoever has given a robot up relies on nothing of its that it has not said it held then.
         let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
         let reported = |log: LogId, length: u64| {
-            let within = |vote: &Vote| vote.held.iter().any(|(of, held)| *of == log && length <= *held);
+            let within = |vote: &Vote| length_of(&vote.held, log).is_some_and(|held| length <= held);
             length == 0 || self.is_forgotten(log) || given_up.clone().all(within)
         };
         reported(id.log(), id.sequence.0 + 1)
             && needed.all(|(log, length)| self.holds(log, length) && reported(log, length))
+    }
+
+    /// Whether all is held that a robot said before its last seal, so that its votes are known.
+    fn holds_past(&self, closing: &Closing, robot: RobotId) -> bool {
+        let named = closing.seals.get(&robot).into_iter().flatten().flat_map(|(_, seal)| &seal.logs);
+        let mut named = named.map(|log| (LogId { robot, boot: log.boot }, log.length));
+        named.all(|(id, length)| {
+            self.holds(id, rules::needed(length, self.logs.get(&id).and_then(|log| log.limit)))
+        })
     }
 
     /// A robot's seals after the base that promise something. One that rests on entries lost before anyone
@@ -254,9 +289,7 @@ impl Ledger {
         let life = logs.map(|(id, _)| id.boot).max().unwrap_or_default();
         let sealed = closing.seals.get(&term.robot).and_then(|seals| seals.keys().next_back());
         let covered = |id: &EntryId| {
-            id.boot >= life
-                || sealed.is_some_and(|last| last.boot >= life)
-                || closing.base.logs.get(&id.log()).is_none_or(|base| id.sequence.0 < base.start)
+            id.boot >= life || sealed.is_some_and(|last| last.boot >= life) || self.is_over(*id)
         };
         let counting = of_term.take_while(|(id, seal)| covered(id) && self.counts_here(closing, **id, seal));
         if let Some((_, seal)) = counting.last() {

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_agent::Node;
-use pleiad_estimation::fact::{Absolute, Ballot, Body, Entry, EntryId, Fingerprint, LogId, Quantity, Vote};
+use pleiad_estimation::fact::{
+    Absolute, Body, Entry, EntryId, Fingerprint, LogId, Quantity, Vote, WHOLE, length_of,
+};
 use pleiad_estimation::fold::FoldConfig;
 use pleiad_estimation::joint::{ErrorForm, Joint};
 use pleiad_estimation::reference::{self, FactContent, JointEkf, ReferenceFact, facts_from_entries};
@@ -50,8 +52,6 @@ pub struct Checks {
     closed: BTreeMap<Timestamp, Vec<(RobotId, u32, Fingerprint)>>,
     /// How often a robot has been evicted.
     lives: BTreeMap<RobotId, u32>,
-    /// Up to when the others had closed when a change was first accepted in a ballot.
-    closed_before: BTreeMap<(u32, Ballot), Timestamp>,
     /// Robots that may have lost facts they had said.
     damaged: BTreeSet<RobotId>,
     pub most_kept: usize,
@@ -83,14 +83,6 @@ impl Checks {
         if *known != print {
             let what = format!("{} has two contents: {:?} and {:?}", entry.id, first.body, entry.body);
             return Err(self.violation(Some(entry.id.robot), what));
-        }
-        if let Body::Vote(vote) = &entry.body
-            && vote.accepted
-        {
-            let stays = |(by, _, _): &&(RobotId, u32, Fingerprint)| !vote.removed.contains(by);
-            let mut cuts = self.closed.iter().filter(|(_, made)| made.iter().any(|made| stays(&made)));
-            let cut = cuts.next_back().map_or(Timestamp::MIN, |(cut, _)| *cut);
-            self.closed_before.entry((vote.epoch, vote.ballot)).or_insert(cut);
         }
         Ok(())
     }
@@ -227,15 +219,17 @@ impl Checks {
                 2 * accepting > members.len() || (vote.operator && accepting == staying().count())
             });
             let Some((_, vote)) = decided else { break };
-            // Of a log that nobody vouches for nothing is accepted, unless a cut had accounted for it.
-            let cut = self.closed_before.get(&(epoch, vote.ballot)).copied().unwrap_or(Timestamp::MIN);
+            // Of a log that nobody vouches for nothing is accepted; of one that someone had forgotten, all.
             for log in self.said.keys().map(|id| id.log()).filter(|log| vote.removed.contains(&log.robot)) {
-                let of_stay = first_boots.get(&log.robot).is_none_or(|first| log.boot >= *first);
-                if of_stay && self.sealed_in(log.robot, cut).is_none_or(|boot| log.boot >= boot) {
-                    ends.entry(log).or_insert(0);
+                match length_of(&vote.held, log) {
+                    Some(WHOLE) => {}
+                    Some(held) => drop(ends.insert(log, held)),
+                    None if first_boots.get(&log.robot).is_none_or(|first| log.boot >= *first) => {
+                        ends.entry(log).or_insert(0);
+                    }
+                    None => {}
                 }
             }
-            ends.extend(vote.held.iter().copied());
             for (robot, boot) in &vote.added {
                 ends.retain(|log, _| log.robot != *robot || log.boot < *boot);
                 first_boots.insert(*robot, *boot);
@@ -244,16 +238,6 @@ impl Checks {
             members.extend(vote.added.iter().map(|(robot, _)| *robot));
         }
         ends
-    }
-
-    /// In which boot a robot first sealed up to a cut.
-    fn sealed_in(&self, robot: RobotId, cut: Timestamp) -> Option<BootIndex> {
-        let reaches = |entry: &Entry| match &entry.body {
-            Body::Seal(seal) => seal.observed.min(seal.answered) >= cut,
-            _ => false,
-        };
-        let mut own = self.said.values().map(|(_, entry)| entry).filter(|entry| entry.id.robot == robot);
-        own.find(|entry| cut > Timestamp::MIN && reaches(entry)).map(|entry| entry.id.boot)
     }
 
     /// After healing: the estimate is the oracle's over what is accepted, nothing of it is missing, and what
