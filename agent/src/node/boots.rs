@@ -67,6 +67,22 @@ impl Node {
         }
     }
 
+    /// Restarted or admitted after the last odometry there will be: the last boot is carried on from its end, to
+    /// be of the team and to answer what is still asked, whenever it comes to be known.
+    pub(super) fn carry_on_at_the_end(&mut self) {
+        if !self.input_ended || self.boot.is_some() {
+            return;
+        }
+        let lived = self.lived || self.membership.joining.is_some();
+        let asked = self.ledger.unanswered(self.config.robot).next().is_some();
+        let Some((_, trajectory)) = self.segments.last() else { return };
+        let begin = Timestamp(trajectory.end().0.max(self.stay_from()).0 + 1);
+        if (lived || asked) && self.may_begin(begin) {
+            self.begin_boot(begin);
+            self.answer();
+        }
+    }
+
     /// `odom_from_nominal` of a boot: the published frame goes on from the boot it carries on.
     pub(super) fn odom_of(&self, boot: &Boot) -> Pose2 {
         boot.continuation.as_ref().map_or_else(Pose2::identity, |from| {

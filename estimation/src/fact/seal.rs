@@ -70,3 +70,18 @@ pub struct Vote {
     /// An operator wants it: no majority is needed.
     pub operator: bool,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_whole_log_stands_for_all_before_it_of_its_robot_alone() {
+        let log = |robot, boot| LogId { robot: RobotId(robot), boot: BootIndex(boot) };
+        let lengths = [(log(1, 0), 7), (log(1, 2), WHOLE), (log(1, 3), 5), (log(2, 1), 4)];
+        let found = [(1, 0), (1, 1), (1, 2), (1, 3), (1, 4), (2, 0), (2, 1)];
+        let found = found.map(|(robot, boot)| length_of(&lengths, log(robot, boot)));
+        let expected = [Some(WHOLE), Some(WHOLE), Some(WHOLE), Some(5), None, None, Some(4)];
+        assert_eq!(found, expected);
+    }
+}

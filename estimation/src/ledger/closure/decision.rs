@@ -1,6 +1,7 @@
 //! What seals and votes change when they are heard.
 
-use super::{Closing, Decision, whole};
+use super::standing::whole;
+use super::{Closing, Decision};
 use crate::RobotId;
 use crate::Timestamp;
 use crate::fact::{EntryId, LogId, Seal, Vote, WHOLE, length_of};

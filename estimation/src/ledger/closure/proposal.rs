@@ -104,7 +104,8 @@ impl Ledger {
             return None;
         }
         let known = |robot: &RobotId| self.holds_past(closing, *robot);
-        let promise = |robot| views.promises(robot).find(|vote| vote.ballot == ballot).filter(|_| known(&robot));
+        let promise =
+            |robot| views.promises(robot).find(|vote| vote.ballot == ballot).filter(|_| known(&robot));
         let promises: Vec<&Vote> = views.staying(asked).map(promise).collect::<Option<_>>()?;
         let accepted = views.staying(asked).flat_map(|robot| views.votes_of(robot));
         let accepted = accepted.map(|(_, vote)| (vote.ballot, vote)).filter(|(_, vote)| vote.accepted);
