@@ -5,14 +5,14 @@ mod decision;
 mod proposal;
 mod standing;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::checkpoint::Checkpoint;
 use super::counts::FactCounts;
-use super::rules::{self, Closure, Standing};
+use super::rules::{self, Closure};
 use super::views::{Term, Views};
 use super::{Ledger, Log};
-use crate::fact::{Entry, EntryId, Fingerprint, LogId, Seal, Vote, WHOLE, length_of};
+use crate::fact::{Entry, EntryId, Fingerprint, LogId, Seal, Vote, WHOLE};
 use crate::fold::FoldConfig;
 use crate::joint::Joint;
 use crate::{BootIndex, RobotId, Timestamp};
