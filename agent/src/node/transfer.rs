@@ -108,7 +108,9 @@ impl Node {
             checkpoint.views.epoch <= views.epoch && views.given_up(self.config.robot).contains(&peer)
         });
         let lost = !self.has_lived() || (self.membership.lost_disk && !self.knows_its_past());
-        let may_take = !given_up || lost || self.membership.joining.is_some();
+        // An outsider may have his from someone who is given up.
+        let doubtful = given_up || self.membership.applicants.contains_key(&peer);
+        let may_take = !doubtful || lost || self.membership.joining.is_some();
         if !may_take || !self.ledger.take_over(checkpoint) {
             return Ok(());
         }
