@@ -132,6 +132,7 @@ impl Node {
             // Of an approximate strategy: nothing that a node could use.
             Event::Said(..) => {}
         }
+        self.carry_on_at_the_end();
         self.advance();
         let Outbox { records, entries, rest } = std::mem::take(&mut self.out);
         let mut commands = Vec::with_capacity(rest.len() + 2);
@@ -233,7 +234,6 @@ impl Node {
         if added {
             // Whoever has just learned that he was evicted says nothing any more.
             self.check_membership();
-            self.carry_on_at_the_end();
             self.answer();
         }
     }
@@ -304,23 +304,7 @@ impl Node {
         for sample in std::mem::take(&mut self.waiting) {
             self.refuse_waiting(SampleRefusal::AfterLastOdometry { time: sample.time });
         }
-        self.carry_on_at_the_end();
         self.answer();
-    }
-
-    /// Restarted after the last odometry there will be: nothing moves any more, so the last boot is carried on
-    /// from its end, without a gap, to answer what is still asked, whenever it comes to be known.
-    fn carry_on_at_the_end(&mut self) {
-        if self.input_ended
-            && self.boot.is_none()
-            && self.membership.joining.is_none()
-            && self.ledger.unanswered(self.config.robot).next().is_some()
-            && let Some((_, trajectory)) = self.segments.last()
-            && self.membership.joining.is_none()
-            && self.may_begin(Timestamp(trajectory.end().0.0 + 1))
-        {
-            self.begin_boot(Timestamp(trajectory.end().0.0 + 1));
-        }
     }
 
     fn notice(&mut self, notice: Notice) {

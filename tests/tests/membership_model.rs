@@ -38,13 +38,17 @@ enum Rule {
     Unbound,
     /// Wrong: who has given a robot up relies on its later words.
     ReliesOn,
+    /// Wrong: a promise is read without what its robot said in an earlier boot.
+    LastBoot,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct State {
-    logs: [Vec<Entry>; ROBOTS],
-    /// `held[p][r]`: how many entries of `r`'s log `p` holds; of its own, all.
-    held: [[u8; ROBOTS]; ROBOTS],
+    /// Of two boots each.
+    logs: [[Vec<Entry>; 2]; ROBOTS],
+    boot: [usize; ROBOTS],
+    /// `held[p][r]`: how many entries of `r`'s logs `p` holds; of its own, all.
+    held: [[[u8; 2]; ROBOTS]; ROBOTS],
     /// The last cut of each robot under the old membership, and how much of each log it rests on.
     closed: [(u8, [u8; ROBOTS]); ROBOTS],
 }
@@ -53,6 +57,8 @@ struct State {
 struct Bounds {
     clock: u8,
     ballots: usize,
+    /// Robots that begin a second boot. Cuts are modelled without.
+    restarts: usize,
 }
 
 fn of((round, robot): (u8, u8)) -> Ballot {
@@ -65,22 +71,39 @@ fn index(number: usize) -> u8 {
 
 impl State {
     fn new() -> Self {
-        Self { logs: Default::default(), held: [[0; ROBOTS]; ROBOTS], closed: [(0, [0; ROBOTS]); ROBOTS] }
+        Self {
+            logs: Default::default(),
+            boot: [0; ROBOTS],
+            held: [[[0; 2]; ROBOTS]; ROBOTS],
+            closed: [(0, [0; ROBOTS]); ROBOTS],
+        }
     }
 
-    fn view(&self, p: usize, r: usize) -> &[Entry] {
-        &self.logs[r][..usize::from(self.held[p][r])]
+    fn view(&self, p: usize, r: usize) -> impl DoubleEndedIterator<Item = &Entry> {
+        let of = |boot: usize| &self.logs[r][boot][..usize::from(self.held[p][r][boot])];
+        of(0).iter().chain(of(1))
+    }
+
+    fn said(&self, r: usize) -> impl DoubleEndedIterator<Item = &Entry> {
+        self.logs[r].iter().flatten()
+    }
+
+    /// Whether `p` holds all of `r`'s earlier log, if it holds anything of the later one: the first entry of that
+    /// says how long the earlier is.
+    fn knows_past(&self, p: usize, r: usize) -> bool {
+        self.held[p][r][1] == 0 || usize::from(self.held[p][r][0]) == self.logs[r][0].len()
     }
 
     fn say(&self, r: usize, entry: Entry) -> Self {
         let mut next = self.clone();
-        next.logs[r].push(entry);
-        next.held[r][r] = index(next.logs[r].len());
+        let boot = self.boot[r];
+        next.logs[r][boot].push(entry);
+        next.held[r][r][boot] = index(next.logs[r][boot].len());
         next
     }
 
     fn promised(&self, p: usize, r: usize) -> Option<Ballot> {
-        let ballots = self.view(p, r).iter().filter_map(|entry| match entry {
+        let ballots = self.view(p, r).filter_map(|entry| match entry {
             Entry::Promise { ballot, .. } | Entry::Accept { ballot, .. } => Some(of(*ballot)),
             Entry::Seal(_) => None,
         });
@@ -88,7 +111,7 @@ impl State {
     }
 
     /// What is decided in the entries that are seen.
-    fn decided<'a>(view: impl Fn(usize) -> &'a [Entry]) -> Vec<Change> {
+    fn decided<'a, V: Iterator<Item = &'a Entry>>(view: impl Fn(usize) -> V) -> Vec<Change> {
         let mut found: Vec<((u8, u8), Change, usize)> = Vec::new();
         for r in 0..ROBOTS {
             for entry in view(r) {
@@ -105,17 +128,17 @@ impl State {
     }
 
     fn sealed(&self, p: usize, r: usize, within: u8) -> (u8, u8) {
-        let entries = self.view(p, r).iter().enumerate().take(usize::from(within));
-        let mut seals = entries.filter_map(|(place, entry)| match entry {
+        let entries = self.view(p, r).enumerate().take(usize::from(within));
+        let seals = entries.filter_map(|(place, entry)| match entry {
             Entry::Seal(until) => Some((*until, index(place) + 1)),
             _ => None,
         });
-        seals.next_back().unwrap_or((0, 0))
+        seals.last().unwrap_or((0, 0))
     }
 
     /// How much of `r`'s log `p` relies on.
     fn relied(&self, p: usize, r: usize, rule: Rule) -> u8 {
-        let given_up = self.logs[p].iter().filter_map(|entry| match entry {
+        let given_up = self.said(p).filter_map(|entry| match entry {
             Entry::Promise { change, .. } if change.removed == Some(index(r)) => Some(change.held),
             _ => None,
         });
@@ -124,7 +147,7 @@ impl State {
 
     /// What is wrong with what has been decided and closed so far.
     fn wrong(&self) -> Option<String> {
-        let decided = Self::decided(|r| &self.logs[r]);
+        let decided = Self::decided(|r| self.said(r));
         let change = decided.first()?;
         if decided.iter().any(|other| other != change) {
             return Some(format!("two changes are decided: {self:?}"));
@@ -144,19 +167,25 @@ impl State {
     }
 
     fn steps(&self, rule: Rule, bounds: Bounds, out: &mut Vec<State>) {
-        let begun = self.logs.iter().enumerate().flat_map(|(r, log)| log.iter().map(move |entry| (r, entry)));
+        let begun = (0..ROBOTS).flat_map(|r| self.said(r).map(move |entry| (r, entry)));
         let begun = begun
             .filter(
                 |(r, entry)| matches!(entry, Entry::Promise { ballot, .. } if usize::from(ballot.1) == *r),
             )
             .count();
+        let restarted: usize = self.boot.iter().sum();
         for r in 0..ROBOTS {
-            for p in (0..ROBOTS).filter(|p| *p != r) {
-                if usize::from(self.held[p][r]) < self.logs[r].len() {
+            for (p, boot) in (0..ROBOTS).filter(|p| *p != r).flat_map(|p| [(p, 0), (p, 1)]) {
+                if usize::from(self.held[p][r][boot]) < self.logs[r][boot].len() {
                     let mut next = self.clone();
-                    next.held[p][r] += 1;
+                    next.held[p][r][boot] += 1;
                     out.push(next);
                 }
+            }
+            if self.boot[r] == 0 && !self.logs[r][0].is_empty() && restarted < bounds.restarts {
+                let mut next = self.clone();
+                next.boot[r] = 1;
+                out.push(next);
             }
             let known = Self::decided(|by| self.view(r, by));
             let (own, _) = self.sealed(r, r, u8::MAX);
@@ -172,7 +201,7 @@ impl State {
                 out.push(self.say(r, Entry::Seal(own + 1)));
             }
             let promise = |ballot, removed: Option<u8>| {
-                let held = removed.map_or(0, |gone| self.held[r][usize::from(gone)]);
+                let held = removed.map_or(0, |gone| self.held[r][usize::from(gone)].iter().sum());
                 Entry::Promise { ballot, change: Change { removed, held, from: own } }
             };
             if begun < bounds.ballots {
@@ -197,7 +226,7 @@ impl State {
                             if usize::from(ballot.1) == by
                                 && change.removed != Some(index(r))
                                 && may_accept(promised, of(*ballot))
-                                && !self.logs[r].contains(entry) =>
+                                && !self.said(r).any(|said| said == entry) =>
                         {
                             out.push(self.say(r, Entry::Accept { ballot: *ballot, change: *change }));
                         }
@@ -214,8 +243,7 @@ impl State {
             if cut > self.closed[r].0 {
                 let mut next = self.clone();
                 let reaches = |entry: &Entry| matches!(entry, Entry::Seal(until) if *until >= cut);
-                let rests_on =
-                    std::array::from_fn(|by| index(self.logs[by].iter().position(reaches).unwrap()) + 1);
+                let rests_on = std::array::from_fn(|by| index(self.said(by).position(reaches).unwrap()) + 1);
                 next.closed[r] = (cut, rests_on);
                 out.push(next);
             }
@@ -223,20 +251,21 @@ impl State {
     }
 
     fn propose(&self, r: usize, rule: Rule) -> Option<State> {
-        let own = self.logs[r].iter().rev().find_map(|entry| match entry {
+        let own = self.said(r).rev().find_map(|entry| match entry {
             Entry::Promise { ballot, change } => Some((*ballot, *change)),
             _ => None,
         });
         let (ballot, asked) = own.filter(|(ballot, _)| usize::from(ballot.1) == r)?;
         let proposed = |entry: &Entry| matches!(entry, Entry::Accept { ballot: of, .. } if *of == ballot);
-        if self.promised(r, r) != Some(of(ballot)) || self.logs[r].iter().any(proposed) {
+        if self.promised(r, r) != Some(of(ballot)) || self.said(r).any(proposed) {
             return None;
         }
         let staying = (0..ROBOTS).filter(|by| asked.removed != Some(index(*by)));
         let promises: Vec<(usize, Change)> = staying
             .clone()
+            .filter(|by| rule == Rule::LastBoot || self.knows_past(r, *by))
             .filter_map(|by| {
-                self.view(r, by).iter().find_map(|entry| match entry {
+                self.view(r, by).find_map(|entry| match entry {
                     Entry::Promise { ballot: of, change } if *of == ballot => Some((by, *change)),
                     _ => None,
                 })
@@ -283,7 +312,7 @@ fn explore(rule: Rule, bounds: Bounds) -> (usize, Option<String>) {
 
 #[test]
 fn no_schedule_decides_two_changes_or_closes_against_one() {
-    let (states, wrong) = explore(Rule::Ballots, Bounds { clock: 1, ballots: 1 });
+    let (states, wrong) = explore(Rule::Ballots, Bounds { clock: 1, ballots: 1, restarts: 0 });
     println!("{states} states");
     assert_eq!(wrong, None);
     assert!(states > 10_000, "{states}");
@@ -291,43 +320,57 @@ fn no_schedule_decides_two_changes_or_closes_against_one() {
 
 #[test]
 fn nor_in_later_cuts() {
-    let (states, wrong) = explore(Rule::Ballots, Bounds { clock: 2, ballots: 1 });
+    let (states, wrong) = explore(Rule::Ballots, Bounds { clock: 2, ballots: 1, restarts: 0 });
     println!("{states} states");
     assert_eq!(wrong, None);
 }
 
 #[test]
 fn nor_with_two_ballots_that_compete() {
-    let (states, wrong) = explore(Rule::Ballots, Bounds { clock: 0, ballots: 2 });
+    let (states, wrong) = explore(Rule::Ballots, Bounds { clock: 0, ballots: 2, restarts: 0 });
     println!("{states} states");
     assert_eq!(wrong, None);
+}
+
+#[test]
+fn nor_with_a_robot_that_begins_a_second_boot() {
+    let (states, wrong) = explore(Rule::Ballots, Bounds { clock: 0, ballots: 2, restarts: 1 });
+    println!("{states} states");
+    assert_eq!(wrong, None);
+}
+
+#[test]
+fn a_promise_without_what_was_said_in_an_earlier_boot_is_caught() {
+    let (states, wrong) = explore(Rule::LastBoot, Bounds { clock: 0, ballots: 2, restarts: 1 });
+    println!("{states} states: {}", wrong.is_some());
+    assert!(wrong.is_some_and(|wrong| wrong.contains("two changes")));
 }
 
 #[cfg(feature = "slow")]
 #[test]
 fn nor_with_two_ballots_and_cuts() {
-    let (states, wrong) = explore(Rule::Ballots, Bounds { clock: 1, ballots: 2 });
+    let (states, wrong) = explore(Rule::Ballots, Bounds { clock: 1, ballots: 2, restarts: 0 });
     println!("{states} states");
     assert_eq!(wrong, None);
 }
 
 #[test]
 fn sealing_on_after_a_promise_is_caught() {
-    let (states, wrong) = explore(Rule::SealsOn, Bounds { clock: 1, ballots: 1 });
+    let (states, wrong) = explore(Rule::SealsOn, Bounds { clock: 1, ballots: 1, restarts: 0 });
     println!("{states} states: {wrong:?}");
     assert!(wrong.is_some_and(|wrong| wrong.contains("newcomer")));
 }
 
 #[test]
 fn relying_on_who_is_given_up_is_caught() {
-    let (states, wrong) = explore(Rule::ReliesOn, Bounds { clock: 1, ballots: 1 });
+    let (states, wrong) = explore(Rule::ReliesOn, Bounds { clock: 1, ballots: 1, restarts: 0 });
     println!("{states} states: {wrong:?}");
     assert!(wrong.is_some_and(|wrong| wrong.contains("not accepted")));
 }
 
 #[test]
 fn proposing_against_what_was_accepted_is_caught() {
-    let (states, wrong) = explore(Rule::Unbound, Bounds { clock: 0, ballots: 2 });
+    let (states, wrong) = explore(Rule::Unbound, Bounds { clock: 0, ballots: 2, restarts: 0 });
     println!("{states} states: {}", wrong.is_some());
     assert!(wrong.is_some_and(|wrong| wrong.contains("two changes")));
 }

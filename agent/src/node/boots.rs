@@ -2,7 +2,7 @@
 
 use pleiad_estimation::fact::{Absolute, Body, Boot, Continuation, NoiseRef, Observation, Profile, Quantity};
 use pleiad_estimation::symmetric::Symmetric3;
-use pleiad_estimation::{Pose2, Timestamp};
+use pleiad_estimation::{BootIndex, Pose2, Timestamp};
 
 use super::{Node, Notice};
 
@@ -18,7 +18,7 @@ impl Node {
         let index = self.next_boot().max(joined.unwrap_or_default()).max(self.first_of_stay());
         if joined.is_some_and(|boot| self.first_of_stay() < boot) {
             // Its eviction was lost with the others' disks; what it has said is asked for as after that of its own.
-            self.lived_boots.clear();
+            self.forget_past();
         }
         let place = self.ledger.settle().member(self.config.robot).map(|member| member.boot);
         let continuation = self.segments.last().map(|(previous, trajectory)| {
@@ -38,6 +38,7 @@ impl Node {
             (None, None) => Pose2::identity(),
         };
         let odom = self.odom_of(&Boot { time, nonce: 0, configuration: 0, nominal, continuation });
+        self.membership.lost_disk |= self.segments.last().is_none() && index > BootIndex(0);
         self.lived = true;
         self.lived_boots.insert(index);
         self.rebased = None;
@@ -63,6 +64,22 @@ impl Node {
             self.say(index, Body::Observation(Observation { time, quantity, noise, observer }));
         } else if continuation.is_none() {
             self.notice(Notice::NoPrior { boot: index });
+        }
+    }
+
+    /// Restarted or admitted after the last odometry there will be: the last boot is carried on from its end, to
+    /// be of the team and to answer what is still asked, whenever it comes to be known.
+    pub(super) fn carry_on_at_the_end(&mut self) {
+        if !self.input_ended || self.boot.is_some() {
+            return;
+        }
+        let lived = self.lived || self.membership.joining.is_some();
+        let asked = self.ledger.unanswered(self.config.robot).next().is_some();
+        let Some((_, trajectory)) = self.segments.last() else { return };
+        let begin = Timestamp(trajectory.end().0.max(self.stay_from()).0 + 1);
+        if (lived || asked) && self.may_begin(begin) {
+            self.begin_boot(begin);
+            self.answer();
         }
     }
 

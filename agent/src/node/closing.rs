@@ -36,15 +36,18 @@ pub(super) struct Membership {
     /// A peer closed the same time with another result.
     disagrees: bool,
     /// Peers that hold no more of this robot's older logs than it does itself.
-    caught_up: BTreeSet<RobotId>,
+    pub caught_up: BTreeSet<RobotId>,
+    /// A boot began in this process without anything of the lives before: their disk was lost.
+    pub lost_disk: bool,
     /// A snapshot on its way.
     pub transfer: Transfer,
 }
 
 impl Membership {
     /// What was closed with words that were not accepted is not compared with anyone's.
-    pub(super) fn forget_hashes(&mut self) {
+    pub(super) fn forget_cuts(&mut self) {
         self.hashes.clear();
+        self.same_epoch.clear();
         self.disagrees = false;
     }
 }

@@ -78,7 +78,7 @@ impl Node {
         if begins && !self.may_begin(sample.time) {
             return self.reckon_alone(sample, gap.is_some());
         }
-        if self.membership.joining.is_some() && self.lived && gap.is_none() {
+        if self.boot.is_none() && self.lived && gap.is_none() {
             self.reckon(sample)?;
             self.carry_on_joined();
         } else if self.boot.is_none() || gap.is_some() {

@@ -19,12 +19,9 @@ const UNAWARE_STATUSES: usize = 5;
 impl Node {
     /// A robot that is not of the team asks to be.
     pub(super) fn check_membership(&mut self) {
+        self.drop_contradicted();
         let robot = self.config.robot;
         let Some(views) = self.ledger.views() else { return };
-        if self.membership.joining.is_some() && self.ledger.is_contradicted() {
-            self.begin_ledger_anew();
-            return;
-        }
         if views.is_active(robot) || self.membership.joining.is_some() {
             return;
         }
@@ -36,17 +33,31 @@ impl Node {
         }
         if evicted {
             // What this robot has closed with its own last words is not what the others close.
-            self.begin_ledger_anew();
+            self.ledger = Self::empty_ledger(&self.config);
+            self.out.records.extend(self.base_record());
+            self.membership.forget_cuts();
             self.notice(Notice::Evicted { boot });
         }
     }
 
-    /// Drops what was closed with words that are not accepted; peers have what is.
-    fn begin_ledger_anew(&mut self) {
-        self.ledger = Self::empty_ledger(&self.config);
-        self.membership.same_epoch.clear();
-        self.out.records.extend(self.base_record());
-        self.membership.forget_hashes();
+    /// Drops a peer's snapshot that rests on words that turn out not to be accepted. A member goes on as after the
+    /// loss of its disk, with a new boot: that is how it came to take such a snapshot.
+    pub(super) fn drop_contradicted(&mut self) {
+        // Who learns that he is out himself drops more than that.
+        let member = self.ledger.views().is_some_and(|views| views.is_active(self.config.robot));
+        if self.ledger.is_contradicted() && (member || self.membership.joining.is_some()) {
+            self.membership.transfer.taken_from = None;
+            self.ledger.drop_base();
+            self.membership.forget_cuts();
+            self.boot = None;
+            self.forget_past();
+        }
+    }
+
+    /// The others are asked again how much they hold of this robot's logs, before it says how long those are.
+    pub(super) fn forget_past(&mut self) {
+        self.lived_boots.clear();
+        self.membership.caught_up.clear();
     }
 
     pub(super) fn next_boot(&self) -> BootIndex {
@@ -59,7 +70,7 @@ impl Node {
         let Some(views) = self.ledger.views() else { return true };
         let wanted = self.membership.joining.unwrap_or_default();
         let mut terms = views.active().filter(|term| term.robot == self.config.robot);
-        if wanted > BootIndex(0) && self.eviction_is_lost() {
+        if self.decisions_are_lost() {
             return terms.any(|term| time > term.from);
         }
         views.epoch >= self.membership.latest_epoch
@@ -72,10 +83,10 @@ impl Node {
         *heard = if same { *heard + 1 } else { 0 };
     }
 
-    /// Whether nobody knows any more that this robot was evicted: all others, and this ledger after hearing
-    /// all of theirs, are in an epoch in which it is a member. They have lost their disks. It begins then as
-    /// one that has lost its own; if someone knows after all, it is evicted once more.
-    fn eviction_is_lost(&self) -> bool {
+    /// Whether nobody knows any more what was decided, such as that this robot was evicted: all others, and this
+    /// ledger after hearing all of theirs, are in an epoch in which it is a member. They have lost their disks.
+    /// It begins then as one that has lost its own; if someone knows after all, it is evicted once more.
+    fn decisions_are_lost(&self) -> bool {
         let Some(views) = self.ledger.views() else { return false };
         let unaware = |robot| self.membership.same_epoch.get(&robot).is_some_and(|n| *n > UNAWARE_STATUSES);
         let (own, others): (Vec<RobotId>, Vec<RobotId>) =
@@ -87,6 +98,12 @@ impl Node {
     pub(super) fn first_of_stay(&self) -> BootIndex {
         let mut terms = self.ledger.views().into_iter().flat_map(Views::active);
         terms.find(|term| term.robot == self.config.robot).map_or(BootIndex(0), |term| term.boot)
+    }
+
+    /// This robot takes part in what is after this, if it is of the team.
+    pub(super) fn stay_from(&self) -> Timestamp {
+        let mut terms = self.ledger.views().into_iter().flat_map(Views::active);
+        terms.find(|term| term.robot == self.config.robot).map_or(Timestamp::MIN, |term| term.from)
     }
 
     /// Odometry of a robot that is not of the team: it goes on by itself, so that nothing of its motion is
@@ -101,7 +118,7 @@ impl Node {
         Ok(())
     }
 
-    /// Admitted, having gone on alone without a gap.
+    /// Of the team again, having gone on alone without a gap.
     pub(super) fn carry_on_joined(&mut self) {
         let end = self.segments.last().map(|(_, trajectory)| trajectory.end());
         if let Some((end, state)) = end {
@@ -116,7 +133,8 @@ impl Node {
         self.membership.evict.retain(|robot| views.is_active(*robot));
         let wish = self.wish();
         let quiet = wish.evict.is_empty() && wish.admit.is_empty() && views.votes.is_empty();
-        if quiet || !self.knows_its_past() {
+        // The first seal of a boot names the earlier logs, and so the votes in them.
+        if quiet || !self.knows_its_past() || self.ledger.sealed_in(self.config.robot) != Some(boot) {
             return false;
         }
         match self.ledger.proposal(&wish) {

@@ -33,6 +33,7 @@ impl Node {
                         }
                     }
                     node.ledger.insert(entry);
+                    node.drop_contradicted();
                 }
                 Record::Tick { boot, time, state, odom } => {
                     node.known_boot = node.known_boot.max(Some(boot));
@@ -71,7 +72,7 @@ impl Node {
             // Evicted: it had asked to be admitted, and has not forgotten it.
             self.ledger = Self::empty_ledger(&self.config);
             self.membership.joining = Some(self.next_boot());
-            self.membership.forget_hashes();
+            self.membership.forget_cuts();
         } else {
             self.ledger.take_over(checkpoint);
             self.segments.forget_until(cut);

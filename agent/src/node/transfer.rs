@@ -1,7 +1,7 @@
 //! Taking over a peer's snapshot, and giving out one's own, in parts.
 
 use pleiad_estimation::ledger::Ledger;
-use pleiad_estimation::{RobotId, Timestamp};
+use pleiad_estimation::{BootIndex, RobotId, Timestamp};
 use pleiad_protocol::{SnapshotPart, SnapshotRequest, decode_checkpoint, encode_checkpoint, limits};
 
 use super::{Command, Node, Notice, Record};
@@ -12,6 +12,8 @@ pub(super) struct Transfer {
     /// The parts received: of whom, of which cut.
     from: Option<(RobotId, Timestamp)>,
     received: Vec<u8>,
+    /// Whose snapshot this ledger rests on, or its own ones since.
+    pub taken_from: Option<RobotId>,
     /// Encoded for peers.
     given: Option<(Timestamp, SnapshotPart)>,
 }
@@ -32,6 +34,9 @@ impl Node {
 
     /// The part of this node's snapshot that a peer asked for; `None` if it has closed nothing yet.
     pub fn serve_snapshot(&mut self, request: &SnapshotRequest) -> Option<SnapshotPart> {
+        if !self.vouches_for_its_base() {
+            return None;
+        }
         let checkpoint = self.ledger.checkpoint()?;
         let given = &mut self.membership.transfer.given;
         // A transfer under way goes on with the snapshot it began with.
@@ -47,6 +52,16 @@ impl Node {
         let end = (start + limits::SNAPSHOT_PART_BYTES).min(whole.bytes.len());
         let (cut, hash, total) = (*cut, whole.hash, whole.total);
         Some(SnapshotPart { cut, hash, total, offset, bytes: whole.bytes[start..end].to_vec() })
+    }
+
+    /// Whether the snapshot that this ledger rests on may be given on. Not if it is of a peer that this robot had
+    /// given up before it lost its disk, or may have.
+    fn vouches_for_its_base(&self) -> bool {
+        let (Some(from), Some(views)) = (self.membership.transfer.taken_from, self.ledger.views()) else {
+            return true;
+        };
+        let given_up = views.given_up(self.config.robot).contains(&from);
+        self.membership.joining.is_some() || (self.knows_its_past() && !given_up)
     }
 
     pub(super) fn snapshot_part(&mut self, peer: RobotId, part: &SnapshotPart) {
@@ -85,15 +100,23 @@ impl Node {
         if self.ledger.cut().is_some_and(|cut| checkpoint.time <= cut) {
             return Ok(());
         }
-        // It may rest on words of one who is given up here.
-        if self.ledger.views().is_some_and(|views| views.given_up(self.config.robot).contains(&peer)) {
+        let own: Vec<BootIndex> =
+            checkpoint.logs.keys().filter(|log| log.robot == self.config.robot).map(|log| log.boot).collect();
+        let (cut, record) = (checkpoint.time, Record::Checkpoint(Box::new(checkpoint.clone())));
+        // Who has lost his disk takes any: it may tell him what he has said himself.
+        let given_up = self.ledger.views().is_some_and(|views| {
+            checkpoint.views.epoch <= views.epoch && views.given_up(self.config.robot).contains(&peer)
+        });
+        let lost = !self.has_lived() || (self.membership.lost_disk && !self.knows_its_past());
+        // An outsider may have his from someone who is given up.
+        let doubtful = given_up || self.membership.applicants.contains_key(&peer);
+        let may_take = !doubtful || lost || self.membership.joining.is_some();
+        if !may_take || !self.ledger.take_over(checkpoint) {
             return Ok(());
         }
-        let own = checkpoint.logs.keys().filter(|log| log.robot == self.config.robot);
-        self.known_boot = self.known_boot.max(own.map(|log| log.boot).max());
-        let cut = checkpoint.time;
-        self.out.records.push(Record::Checkpoint(Box::new(checkpoint.clone())));
-        self.ledger.take_over(checkpoint);
+        self.membership.transfer.taken_from = Some(peer);
+        self.known_boot = self.known_boot.max(own.into_iter().max());
+        self.out.records.push(record);
         self.segments.forget_until(cut);
         self.remember_hash(cut, hash);
         self.notice(Notice::SnapshotTaken { peer, cut });

@@ -10,4 +10,4 @@ pub use entry::{
     NominalState, Observation, Profile, Quantity, VoidReason,
 };
 pub use fingerprint::Fingerprint;
-pub use seal::{Ballot, Seal, SealedLog, Vote};
+pub use seal::{Ballot, Seal, SealedLog, Vote, WHOLE, length_of};

@@ -38,6 +38,16 @@ pub struct Ballot {
     pub robot: RobotId,
 }
 
+/// Stands for the length of a log that is over, accounted for and forgotten, as all before it of its robot are.
+pub const WHOLE: u64 = u64::MAX;
+
+/// How much of a log a list says is held or accepted.
+pub fn length_of(lengths: &[(LogId, u64)], log: LogId) -> Option<u64> {
+    let whole = |of: LogId, length| length == WHOLE && of.robot == log.robot && log.boot <= of.boot;
+    let stated = lengths.iter().filter(|(of, length)| *of == log || whole(*of, *length));
+    stated.map(|(_, length)| *length).max()
+}
+
 /// A vote on who belongs to the team from now on. The robot whose ballot it is asks by promising itself,
 /// proposes by accepting first, and the others follow.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,7 +61,7 @@ pub struct Vote {
     pub accepted: bool,
     /// Members to be evicted, ascending.
     pub removed: Vec<RobotId>,
-    /// How much of their logs is accepted, ascending. A promise relies on nothing beyond.
+    /// How much of their logs is accepted, ascending, see [`length_of`]. A promise relies on nothing beyond.
     pub held: Vec<(LogId, u64)>,
     /// Robots to be admitted, and from which boot on, ascending.
     pub added: Vec<(RobotId, BootIndex)>,
@@ -59,4 +69,19 @@ pub struct Vote {
     pub from: Timestamp,
     /// An operator wants it: no majority is needed.
     pub operator: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_whole_log_stands_for_all_before_it_of_its_robot_alone() {
+        let log = |robot, boot| LogId { robot: RobotId(robot), boot: BootIndex(boot) };
+        let lengths = [(log(1, 0), 7), (log(1, 2), WHOLE), (log(1, 3), 5), (log(2, 1), 4)];
+        let found = [(1, 0), (1, 1), (1, 2), (1, 3), (1, 4), (2, 0), (2, 1)];
+        let found = found.map(|(robot, boot)| length_of(&lengths, log(robot, boot)));
+        let expected = [Some(WHOLE), Some(WHOLE), Some(WHOLE), Some(5), None, None, Some(4)];
+        assert_eq!(found, expected);
+    }
 }

@@ -1,7 +1,7 @@
 //! What is accepted, and a ledger filed anew when that has changed.
 
 use super::{Ledger, Refusal};
-use crate::fact::{Body, Entry, EntryId};
+use crate::fact::{Body, Entry, EntryId, length_of};
 use crate::{BootIndex, RobotId, Timestamp};
 
 impl Ledger {
@@ -19,7 +19,7 @@ impl Ledger {
         // A log may be known by name alone, because a seal speaks of it.
         let stays = closing.views.terms.iter().filter(|term| term.robot == id.robot && term.boot <= id.boot);
         let accepted = match stays.max_by_key(|term| term.boot) {
-            Some(term) if term.until.is_some() => term.limits.iter().any(|(log, _)| *log == id.log()),
+            Some(term) if term.until.is_some() => length_of(&term.limits, id.log()).is_some(),
             Some(_) => true,
             None => log.is_some_and(|log| log.held() > 0),
         };

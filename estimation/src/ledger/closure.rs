@@ -3,15 +3,16 @@
 mod cut;
 mod decision;
 mod proposal;
+mod standing;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::checkpoint::Checkpoint;
 use super::counts::FactCounts;
-use super::rules::{self, Closure, Standing};
+use super::rules::{self, Closure};
 use super::views::{Term, Views};
 use super::{Ledger, Log};
-use crate::fact::{Entry, EntryId, Fingerprint, LogId, Seal, Vote};
+use crate::fact::{Entry, EntryId, Fingerprint, LogId, Seal, Vote, WHOLE};
 use crate::fold::FoldConfig;
 use crate::joint::Joint;
 use crate::{BootIndex, RobotId, Timestamp};
@@ -46,6 +47,12 @@ pub(super) struct Decision {
 impl Ledger {
     /// Empty, of one robot of a team that closes its past.
     pub fn closing(config: FoldConfig, closure: Closure, owner: RobotId) -> Self {
+        let base = Self::first_base(&config, &closure);
+        Self::from_checkpoint(config, closure, owner, base)
+    }
+
+    /// What a ledger rests on that knows nothing.
+    fn first_base(config: &FoldConfig, closure: &Closure) -> Checkpoint {
         let terms = closure.members.iter().map(|robot| Term {
             robot: *robot,
             from: Timestamp::MIN,
@@ -53,9 +60,9 @@ impl Ledger {
             until: None,
             limits: Vec::new(),
         });
-        let base = Checkpoint {
+        Checkpoint {
             time: Timestamp::MIN,
-            configuration: configuration(&config, &closure),
+            configuration: configuration(config, closure),
             joint: Joint::new(config.form),
             logs: BTreeMap::new(),
             floors: BTreeMap::new(),
@@ -65,8 +72,7 @@ impl Ledger {
             views: Views { epoch: 0, terms: terms.collect(), votes: BTreeMap::new() },
             open: BTreeMap::new(),
             counts: FactCounts::default(),
-        };
-        Self::from_checkpoint(config, closure, owner, base)
+        }
     }
 
     /// The ledger of a robot that knows nothing but a snapshot. It must have been made under the same
@@ -84,7 +90,7 @@ impl Ledger {
         let forgotten =
             |log: &LogId| checkpoint.floors.get(&log.robot).is_some_and(|floor| log.boot < *floor);
         for (log, held) in checkpoint.views.terms.iter().flat_map(|term| &term.limits) {
-            if !forgotten(log) {
+            if !forgotten(log) && *held != WHOLE {
                 ledger.logs.entry(*log).or_default().end_at(*held);
             }
         }
@@ -130,13 +136,17 @@ impl Ledger {
         self.closing.as_ref().map(|closing| &closing.base)
     }
 
-    /// Rests on a peer's snapshot from now on; what is held beyond it is kept.
-    pub fn take_over(&mut self, checkpoint: Checkpoint) {
-        let Some(closing) = &self.closing else { return };
+    /// Rests on a peer's snapshot from now on; what is held beyond it is kept. `false` if it is known here that
+    /// the snapshot counts words of someone evicted that were not accepted: then nothing changes.
+    pub fn take_over(&mut self, checkpoint: Checkpoint) -> bool {
+        let Some(closing) = &self.closing else { return false };
         let (closure, owner) = (closing.closure.clone(), closing.owner);
         let mut fresh = Self::from_checkpoint(self.config, closure, owner, checkpoint);
         for entry in self.by_stay().into_iter().flat_map(|(_, log)| log.all()) {
             fresh.insert(entry.clone());
+        }
+        if fresh.is_contradicted() {
+            return false;
         }
         fresh.quarantined = std::mem::take(&mut self.quarantined);
         #[cfg(feature = "planted")]
@@ -144,6 +154,22 @@ impl Ledger {
             fresh.planted = self.planted;
         }
         *self = fresh;
+        true
+    }
+
+    /// Whether the snapshot it rests on counts words of someone evicted that were not accepted. Only who was
+    /// evicted, or has lost his disk, comes to that: all others have said what they rely on before it was
+    /// decided.
+    pub fn is_contradicted(&self) -> bool {
+        self.closing.as_ref().is_some_and(|closing| closing.contradicted)
+    }
+
+    /// Rests on nothing; what is held is kept.
+    pub fn drop_base(&mut self) {
+        if let Some(closing) = &self.closing {
+            let base = Self::first_base(&self.config, &closing.closure);
+            self.take_over(base);
+        }
     }
 
     /// Whether a log is over and forgotten.
@@ -165,12 +191,6 @@ impl Ledger {
         logs.map(|(id, log)| (*id, log.held()))
     }
 
-    /// Whether the snapshot it rests on counts words of someone evicted that were not accepted. Members never
-    /// come to that: they have said what they rely on before it was decided.
-    pub fn is_contradicted(&self) -> bool {
-        self.closing.as_ref().is_some_and(|closing| closing.contradicted)
-    }
-
     /// Whether a change is decided that cannot take effect here, because entries that it accepts are missing.
     pub fn lacks_accepted(&self) -> bool {
         let decided = self.closing.as_ref().and_then(|closing| closing.views.decided());
@@ -179,6 +199,13 @@ impl Ledger {
 
     /// Whether all that is accepted of a log is held; its author may have said that it ends earlier.
     fn holds_accepted(&self, log: LogId, held: u64) -> bool {
+        if held == WHOLE {
+            let stay = self.views().into_iter().flat_map(Views::active).find(|term| term.robot == log.robot);
+            let known = self.logs.keys().filter(|id| id.robot == log.robot && id.boot <= log.boot).copied();
+            let of_stay = stay.map_or(log.boot.0, |term| term.boot.0)..=log.boot.0;
+            let of_stay = of_stay.map(|boot| LogId { robot: log.robot, boot: BootIndex(boot) });
+            return known.chain(of_stay).all(|id| self.is_complete(id));
+        }
         self.holds(log, rules::needed(held, self.logs.get(&log).and_then(|log| log.limit)))
     }
 
@@ -205,127 +232,6 @@ impl Ledger {
         let closing = self.closing.as_ref()?;
         let later = closing.seals.get(&robot).and_then(|seals| seals.keys().next_back());
         later.or_else(|| closing.base.seals.get(&robot).map(|(id, _)| id)).map(|id| id.boot)
-    }
-
-    /// How far a log is held; what is over and forgotten is held to any length.
-    fn holds(&self, log: LogId, length: u64) -> bool {
-        self.is_forgotten(log) || self.logs.get(&log).is_some_and(|held| held.held() >= length) || length == 0
-    }
-
-    /// Whether a seal counts: everything it speaks of is held, and nothing speaks against its author.
-    fn counts_here(&self, closing: &Closing, id: EntryId, seal: &Seal) -> bool {
-        let of = |boot| LogId { robot: id.robot, boot };
-        let mut needed = seal.logs.iter().map(|log| {
-            let ends = self.logs.get(&of(log.boot)).and_then(|log| log.limit);
-            (of(log.boot), rules::needed(log.length, ends))
-        });
-        // Whoever has given a robot up relies on nothing of its that it has not said it held then.
-        let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
-        let reported = |log: LogId, length: u64| {
-            let within = |vote: &Vote| vote.held.iter().any(|(of, held)| *of == log && length <= *held);
-            length == 0 || self.is_forgotten(log) || given_up.clone().all(within)
-        };
-        reported(id.log(), id.sequence.0 + 1)
-            && needed.all(|(log, length)| self.holds(log, length) && reported(log, length))
-    }
-
-    /// A robot's seals after the base that promise something. One that rests on entries lost before anyone
-    /// held them all does not, since its answers may be among them; nor do later ones, which rest on what it
-    /// has said, until its author says again how much there is.
-    fn whole_seals<'a>(
-        &'a self,
-        closing: &'a Closing,
-        robot: RobotId,
-    ) -> impl Iterator<Item = (&'a EntryId, &'a Seal)> {
-        let ends = move |log: LogId| self.logs.get(&log).and_then(|held| held.limit);
-        whole(closing.seals.get(&robot).into_iter().flatten(), move |log| {
-            if self.is_forgotten(log) { None } else { ends(log) }
-        })
-    }
-
-    fn standing(&self, closing: &Closing, term: &Term) -> Standing {
-        let mut standing = Standing { observed: Timestamp::MIN, answered: Timestamp::MIN, from: term.from };
-        let base = closing.base.seals.get(&term.robot).map(|(id, seal)| (id, seal));
-        let later = self.whole_seals(closing, term.robot);
-        // A log is said to have ended once, so that a later seal rests on what earlier ones speak of.
-        let of_term = base.into_iter().chain(later).filter(|(id, _)| id.boot >= term.boot);
-        // Nor does it rest on an earlier life before the present one has said how much of that there is.
-        let logs = self.logs.iter().filter(|(id, log)| id.robot == term.robot && log.held() > 0);
-        let life = logs.map(|(id, _)| id.boot).max().unwrap_or_default();
-        let sealed = closing.seals.get(&term.robot).and_then(|seals| seals.keys().next_back());
-        let covered = |id: &EntryId| {
-            id.boot >= life
-                || sealed.is_some_and(|last| last.boot >= life)
-                || closing.base.logs.get(&id.log()).is_none_or(|base| id.sequence.0 < base.start)
-        };
-        let counting = of_term.take_while(|(id, seal)| covered(id) && self.counts_here(closing, **id, seal));
-        if let Some((_, seal)) = counting.last() {
-            standing.observed = seal.observed;
-            standing.answered = seal.answered;
-        }
-        standing
-    }
-
-    /// Up to when the owner has said that it has answered everything that names it, all its answers being
-    /// held here. What it has promised on answers that were lost with its disk, it promises no more.
-    pub fn answered(&self) -> Timestamp {
-        let Some(closing) = &self.closing else { return Timestamp::MIN };
-        let base = closing.base.seals.get(&closing.owner).map(|(id, seal)| (id, seal));
-        let later = self.whole_seals(closing, closing.owner);
-        let held =
-            base.into_iter().chain(later).take_while(|(id, seal)| self.counts_here(closing, **id, seal));
-        held.last().map_or(Timestamp::MIN, |(_, seal)| seal.answered)
-    }
-
-    /// Up to when the owner may say that it has answered everything that names it.
-    pub fn answerable(&self) -> Timestamp {
-        let Some(closing) = &self.closing else { return Timestamp::MIN };
-        #[cfg(feature = "planted")]
-        if self.planted == Some(super::Planted::AnswerBlindly) {
-            return Timestamp::MAX;
-        }
-        let members: Vec<Standing> =
-            closing.views.active().map(|term| self.standing(closing, term)).collect();
-        // Looking through what is owed is worth it only if something would follow.
-        let sealed = closing.closure.floor(rules::answerable(members.iter().copied(), None));
-        let answered = self.answered();
-        if sealed <= answered {
-            return answered;
-        }
-        let owed = self.unanswered(closing.owner).map(|(_, time)| time).min();
-        closing.closure.floor(rules::answerable(members, owed))
-    }
-
-    /// The latest cut that the seals held allow, if it is later than the last one.
-    pub fn closable(&self) -> Option<Timestamp> {
-        let closing = self.closing.as_ref()?;
-        let members = closing.views.active().map(|term| self.standing(closing, term));
-        let until = rules::final_until(members);
-        #[cfg(feature = "planted")]
-        let until = if self.planted == Some(super::Planted::CloseByNumbers) {
-            self.acknowledged(closing)
-        } else {
-            until
-        };
-        let cut = closing.closure.floor(until);
-        (cut > closing.base.time && cut < Timestamp::MAX).then_some(cut)
-    }
-
-    /// The wrong rule: everything up to the last observation of which all members have said, by a later
-    /// entry, that they hold it.
-    #[cfg(feature = "planted")]
-    fn acknowledged(&self, closing: &Closing) -> Timestamp {
-        let last = |robot: RobotId| {
-            let logs = self.logs.iter().filter(|(id, _)| id.robot == robot);
-            let times = logs.flat_map(|(_, log)| log.entries()).filter_map(|entry| match &entry.body {
-                crate::fact::Body::Observation(observation) => Some(observation.time),
-                crate::fact::Body::Boot(boot) => Some(boot.time),
-                crate::fact::Body::Seal(seal) => Some(seal.observed),
-                _ => None,
-            });
-            times.max().unwrap_or(closing.base.time)
-        };
-        closing.views.active().map(|term| last(term.robot)).min().unwrap_or(Timestamp::MIN)
     }
 
     /// Closes the past up to `cut`, which must be [`Ledger::closable`]. Gives the hash of the snapshot.
@@ -365,25 +271,6 @@ impl Ledger {
         logs.sort_by_key(|(id, _)| (admitted(id), *id));
         logs
     }
-}
-
-/// Of the seals of one robot, in their order, those that rest on nothing lost; `ends` says where its logs end.
-fn whole<'a>(
-    seals: impl Iterator<Item = (&'a EntryId, &'a Seal)>,
-    ends: impl Fn(LogId) -> Option<u64>,
-) -> impl Iterator<Item = (&'a EntryId, &'a Seal)> {
-    let mut lost: BTreeSet<BootIndex> = BTreeSet::new();
-    seals.filter(move |(id, seal)| {
-        for log in &seal.logs {
-            let of = LogId { robot: id.robot, boot: log.boot };
-            if rules::needed(log.length, ends(of)) < log.length {
-                lost.insert(log.boot);
-            } else {
-                lost.remove(&log.boot);
-            }
-        }
-        lost.is_empty()
-    })
 }
 
 fn configuration(config: &FoldConfig, closure: &Closure) -> u64 {

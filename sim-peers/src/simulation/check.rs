@@ -3,18 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_agent::Node;
-use pleiad_estimation::fact::{Absolute, Ballot, Body, Entry, EntryId, Fingerprint, LogId, Quantity, Vote};
+use pleiad_estimation::fact::{
+    Absolute, Body, Entry, EntryId, Fingerprint, LogId, Quantity, Vote, WHOLE, length_of,
+};
 use pleiad_estimation::fold::FoldConfig;
-use pleiad_estimation::joint::{ErrorForm, Joint};
-use pleiad_estimation::reference::{self, FactContent, JointEkf, ReferenceFact, facts_from_entries};
-use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
+use pleiad_estimation::joint::Joint;
+use pleiad_estimation::reference::facts_from_entries;
+use pleiad_estimation::{BootIndex, RobotId, Timestamp};
 
-/// Relative difference from the oracle that rounding explains.
-const TOLERANCE: f64 = 1e-9;
-
-/// How many times what the oracle is moved by one rounding of its input another implementation may be off it,
-/// where the update is so badly conditioned that this is more.
-const ROUNDINGS: f64 = 30.0;
+use super::oracle;
 
 /// An invariant that did not hold.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +47,6 @@ pub struct Checks {
     closed: BTreeMap<Timestamp, Vec<(RobotId, u32, Fingerprint)>>,
     /// How often a robot has been evicted.
     lives: BTreeMap<RobotId, u32>,
-    /// Up to when the others had closed when a change was first accepted in a ballot.
-    closed_before: BTreeMap<(u32, Ballot), Timestamp>,
     /// Robots that may have lost facts they had said.
     damaged: BTreeSet<RobotId>,
     pub most_kept: usize,
@@ -83,14 +78,6 @@ impl Checks {
         if *known != print {
             let what = format!("{} has two contents: {:?} and {:?}", entry.id, first.body, entry.body);
             return Err(self.violation(Some(entry.id.robot), what));
-        }
-        if let Body::Vote(vote) = &entry.body
-            && vote.accepted
-        {
-            let stays = |(by, _, _): &&(RobotId, u32, Fingerprint)| !vote.removed.contains(by);
-            let mut cuts = self.closed.iter().filter(|(_, made)| made.iter().any(|made| stays(&made)));
-            let cut = cuts.next_back().map_or(Timestamp::MIN, |(cut, _)| *cut);
-            self.closed_before.entry((vote.epoch, vote.ballot)).or_insert(cut);
         }
         Ok(())
     }
@@ -227,15 +214,17 @@ impl Checks {
                 2 * accepting > members.len() || (vote.operator && accepting == staying().count())
             });
             let Some((_, vote)) = decided else { break };
-            // Of a log that nobody vouches for nothing is accepted, unless a cut had accounted for it.
-            let cut = self.closed_before.get(&(epoch, vote.ballot)).copied().unwrap_or(Timestamp::MIN);
+            // Of a log that nobody vouches for nothing is accepted; of one that someone had forgotten, all.
             for log in self.said.keys().map(|id| id.log()).filter(|log| vote.removed.contains(&log.robot)) {
-                let of_stay = first_boots.get(&log.robot).is_none_or(|first| log.boot >= *first);
-                if of_stay && self.sealed_in(log.robot, cut).is_none_or(|boot| log.boot >= boot) {
-                    ends.entry(log).or_insert(0);
+                match length_of(&vote.held, log) {
+                    Some(WHOLE) => {}
+                    Some(held) => drop(ends.insert(log, held)),
+                    None if first_boots.get(&log.robot).is_none_or(|first| log.boot >= *first) => {
+                        ends.entry(log).or_insert(0);
+                    }
+                    None => {}
                 }
             }
-            ends.extend(vote.held.iter().copied());
             for (robot, boot) in &vote.added {
                 ends.retain(|log, _| log.robot != *robot || log.boot < *boot);
                 first_boots.insert(*robot, *boot);
@@ -244,16 +233,6 @@ impl Checks {
             members.extend(vote.added.iter().map(|(robot, _)| *robot));
         }
         ends
-    }
-
-    /// In which boot a robot first sealed up to a cut.
-    fn sealed_in(&self, robot: RobotId, cut: Timestamp) -> Option<BootIndex> {
-        let reaches = |entry: &Entry| match &entry.body {
-            Body::Seal(seal) => seal.observed.min(seal.answered) >= cut,
-            _ => false,
-        };
-        let mut own = self.said.values().map(|(_, entry)| entry).filter(|entry| entry.id.robot == robot);
-        own.find(|entry| cut > Timestamp::MIN && reaches(entry)).map(|entry| entry.id.boot)
     }
 
     /// After healing: the estimate is the oracle's over what is accepted, nothing of it is missing, and what
@@ -283,68 +262,9 @@ impl Checks {
             let what = format!("{observed} observations were made, {counted} are counted: {counts:?}");
             return Err(self.violation(robot, what));
         }
-        let form = match fold.form {
-            ErrorForm::Invariant => reference::ErrorForm::Invariant,
-            ErrorForm::Additive => reference::ErrorForm::Additive,
-        };
-        let facts = facts_from_entries(&entries);
-        let oracle = JointEkf { form, gate: fold.gate }.fold(&facts);
-        if !oracle.near_gate(&fold.gate, 1e-6).is_empty() {
-            // Correct implementations may decide differently there.
-            return Ok(());
-        }
-        let joint = ledger.joint();
-        if joint.members().count() != oracle.robots.len() {
-            let (ours, theirs) = (joint.members().count(), oracle.robots.len());
-            return Err(self.violation(robot, format!("{ours} robots placed, {theirs} by the oracle")));
-        }
-        let largest = oracle.covariance.matrix().amax();
-        let moved = JointEkf { form, gate: fold.gate }.fold(&rounded(&facts));
-        for expected in &oracle.robots {
-            let Some((member, row)) = joint.member(expected.robot).zip(joint.index(expected.robot)) else {
-                return Err(self.violation(robot, format!("robot {} is not placed", expected.robot)));
-            };
-            let apart = member.correction.between(&expected.correction).log().amax();
-            let scale = 1.0 + expected.correction.position().norm();
-            // Where rounding alone moves the oracle far, no other correct implementation can be nearer.
-            let by_rounding = moved
-                .robots
-                .iter()
-                .find(|robot| robot.robot == expected.robot)
-                .map_or(0.0, |robot| robot.correction.between(&expected.correction).log().amax());
-            if apart.is_nan() || apart > (TOLERANCE * scale).max(ROUNDINGS * by_rounding) {
-                let what = format!("robot {} is {apart:e} off the oracle", expected.robot);
-                return Err(self.violation(robot, what));
-            }
-            for other in &oracle.robots {
-                let block = joint.index(other.robot).map(|column| joint.covariance().block(row, column));
-                let expected_block = oracle.covariance.block(expected.robot, other.robot);
-                let apart = block.zip(expected_block).map_or(f64::NAN, |(a, b)| (a - b).amax());
-                let moved_block = moved.covariance.block(expected.robot, other.robot);
-                let by_rounding = moved_block.zip(expected_block).map_or(0.0, |(a, b)| (a - b).amax());
-                if apart.is_nan() || apart > (TOLERANCE * largest).max(ROUNDINGS * by_rounding) {
-                    let what = format!("P of {} and {} is {apart:e} off", expected.robot, other.robot);
-                    return Err(self.violation(robot, what));
-                }
-            }
-        }
-        Ok(())
+        oracle::agrees(ledger.joint(), &facts_from_entries(&entries), fold)
+            .map_err(|what| self.violation(robot, what))
     }
-}
-
-/// The facts with the observers' nominal poses changed in their last digits.
-fn rounded(facts: &[ReferenceFact]) -> Vec<ReferenceFact> {
-    let nudged = |pose: &Pose2| {
-        let by = 1.0 + 4.0 * f64::EPSILON;
-        Pose2::new(pose.x_m() * by, pose.y_m() * by, pose.yaw_rad() * by)
-    };
-    let mut facts = facts.to_vec();
-    for fact in &mut facts {
-        if let FactContent::Measurement(measurement) = &mut fact.content {
-            measurement.observer.nominal.nominal = nudged(&measurement.observer.nominal.nominal);
-        }
-    }
-    facts
 }
 
 fn first_of(log: LogId) -> EntryId {

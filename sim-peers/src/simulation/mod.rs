@@ -9,9 +9,11 @@ mod chance;
 mod check;
 mod disk;
 mod network;
+mod oracle;
 mod plan;
 mod run;
 mod team;
+mod units;
 
 pub use check::Violation;
 pub use plan::Plan;

@@ -298,7 +298,12 @@ impl<'a> Run<'a> {
         let Some(node) = self.robots.get_mut(&id).and_then(|robot| robot.node.as_mut()) else {
             return Ok(());
         };
-        for command in node.handle(event) {
+        let commands = node.handle(event);
+        // He knows it from now on, even if he dies before he has said it.
+        if commands.iter().any(|command| matches!(command, Command::Notice(Notice::Evicted { .. }))) {
+            self.checks.damages(id);
+        }
+        for command in commands {
             if let Some(robot) = self.robots.get_mut(&id)
                 && let Some((commands, back_s)) = robot.doomed
             {
@@ -372,7 +377,6 @@ impl<'a> Run<'a> {
         match notice {
             Notice::Evicted { .. } => {
                 self.outcome.evictions += 1;
-                self.checks.damages(id);
             }
             Notice::SnapshotTaken { .. } => {
                 self.outcome.taken_over += 1;

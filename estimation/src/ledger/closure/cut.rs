@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Closing, Decision};
-use crate::fact::{Body, Entry, EntryId, LogId, SealedLog};
+use crate::fact::{Body, Entry, EntryId, LogId, SealedLog, WHOLE, length_of};
 use crate::fold::{FactKey, fold};
 use crate::ledger::checkpoint::{Checkpoint, LogBase};
 use crate::ledger::{Ledger, rules};
@@ -160,9 +160,13 @@ impl Ledger {
         };
         for term in closing.views.terms.iter().filter(|term| term.from < cut) {
             if term.until.is_some_and(|until| until < cut) {
-                for (id, held) in &term.limits {
-                    raise(*id, *held);
-                    limits.insert(*id, *held);
+                let known = self.logs.iter().filter(|(id, _)| id.robot == term.robot);
+                let whole = known.filter(|(id, _)| length_of(&term.limits, **id) == Some(WHOLE));
+                let whole = whole.filter_map(|(id, log)| Some((*id, log.limit?)));
+                let stated = term.limits.iter().copied().filter(|(_, held)| *held != WHOLE);
+                for (id, held) in stated.chain(whole) {
+                    raise(id, held);
+                    limits.insert(id, held);
                 }
                 continue;
             }

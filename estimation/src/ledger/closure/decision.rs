@@ -1,9 +1,10 @@
 //! What seals and votes change when they are heard.
 
-use super::{Closing, Decision, whole};
+use super::standing::whole;
+use super::{Closing, Decision};
 use crate::RobotId;
 use crate::Timestamp;
-use crate::fact::{EntryId, LogId, Seal, Vote};
+use crate::fact::{EntryId, LogId, Seal, Vote, WHOLE, length_of};
 use crate::ledger::Ledger;
 
 impl Ledger {
@@ -12,6 +13,24 @@ impl Ledger {
         closing.seals.entry(id.robot).or_default().insert(id, seal.clone());
         self.end_logs(id, seal);
         self.release();
+    }
+
+    /// How far an evicted robot's promises of its present stay reach within what is accepted of its logs.
+    fn sealed_within(&self, closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
+        let Some(term) = closing.views.active().find(|term| term.robot == robot) else {
+            return Timestamp::MIN;
+        };
+        let ends = |log: LogId| match length_of(&vote.held, log) {
+            Some(WHOLE) => self.logs.get(&log).and_then(|log| log.limit),
+            held => held,
+        };
+        let seals = closing.seals.get(&robot).into_iter().flatten().filter(|(id, _)| accepts(vote, **id));
+        let later: Vec<(&EntryId, &Seal)> = whole(seals, ends).collect();
+        let seals = closing.base.seals.get(&robot).map(|(id, seal)| (id, seal)).into_iter().chain(later);
+        let seal = seals.rev().find(|(id, _)| id.boot >= term.boot);
+        let until =
+            seal.map_or(Timestamp::MIN, |(_, seal)| closing.closure.floor(seal.observed.min(seal.answered)));
+        until.max(term.from)
     }
 
     /// Ends the logs that a seal says have ended; not on the word of one who is given up.
@@ -44,7 +63,7 @@ impl Ledger {
                 return;
             }
             let vote = vote.clone();
-            let reach = |robot: &RobotId| sealed_within(closing, *robot, &vote);
+            let reach = |robot: &RobotId| self.sealed_within(closing, *robot, &vote);
             let until: Vec<Timestamp> = vote.removed.iter().map(reach).collect();
             let gone: Vec<LogId> =
                 self.logs.keys().copied().filter(|log| vote.removed.contains(&log.robot)).collect();
@@ -60,8 +79,8 @@ impl Ledger {
                 self.end_logs(id, &seal);
             }
             for id in gone {
-                let limit = vote.held.iter().find(|(log, _)| *log == id).map_or(0, |(_, held)| *held);
-                if let Some(log) = self.logs.get_mut(&id) {
+                let limit = length_of(&vote.held, id).unwrap_or(0);
+                if let Some(log) = self.logs.get_mut(&id).filter(|_| limit != WHOLE) {
                     if let Some(closing) = self.closing.as_mut().filter(|_| log.base > limit) {
                         closing.contradicted = true;
                     }
@@ -78,18 +97,5 @@ impl Ledger {
 
 /// Whether an entry is within what a vote says is held of its log.
 fn accepts(vote: &Vote, id: EntryId) -> bool {
-    vote.held.iter().any(|(log, held)| *log == id.log() && id.sequence.0 < *held)
-}
-
-/// How far an evicted robot's promises of its present stay reach within what is accepted of its logs.
-fn sealed_within(closing: &Closing, robot: RobotId, vote: &Vote) -> Timestamp {
-    let Some(term) = closing.views.active().find(|term| term.robot == robot) else { return Timestamp::MIN };
-    let ends = |log: LogId| vote.held.iter().find(|(of, _)| *of == log).map(|(_, held)| *held);
-    let seals = closing.seals.get(&robot).into_iter().flatten().filter(|(id, _)| accepts(vote, **id));
-    let later: Vec<(&EntryId, &Seal)> = whole(seals, ends).collect();
-    let seals = closing.base.seals.get(&robot).map(|(id, seal)| (id, seal)).into_iter().chain(later);
-    let seal = seals.rev().find(|(id, _)| id.boot >= term.boot);
-    let until =
-        seal.map_or(Timestamp::MIN, |(_, seal)| closing.closure.floor(seal.observed.min(seal.answered)));
-    until.max(term.from)
+    length_of(&vote.held, id.log()).is_some_and(|held| id.sequence.0 < held)
 }

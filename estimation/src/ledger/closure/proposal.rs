@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::fact::{Ballot, LogId, Vote};
+use crate::fact::{Ballot, LogId, Vote, WHOLE};
 use crate::ledger::closure::Closing;
 use crate::ledger::{Ledger, rules};
 use crate::{BootIndex, RobotId, Timestamp};
@@ -29,7 +29,7 @@ impl Ledger {
         if !closing.views.is_active(closing.owner) || closing.views.decided().is_some() {
             return None;
         }
-        let vote = accept(closing).or_else(|| propose(closing, wish));
+        let vote = accept(closing).or_else(|| self.propose(closing, wish));
         vote.or_else(|| self.promise(closing, wish)).or_else(|| self.begin(closing, wish))
     }
 
@@ -92,14 +92,55 @@ impl Ledger {
         Some(self.promise_of(closing, ballot, removed.into_iter().collect(), operator))
     }
 
+    /// Proposes in its own ballot, once all who would stay have promised it and all that they said before is held:
+    /// they may have accepted something in an earlier boot.
+    fn propose(&self, closing: &Closing, wish: &Wish) -> Option<Vote> {
+        let (views, owner) = (&closing.views, closing.owner);
+        let asked = views.promises(owner).next_back().filter(|vote| vote.ballot.robot == owner)?;
+        let ballot = asked.ballot;
+        if views.ballot(owner) != Some(ballot)
+            || views.votes_of(owner).any(|(_, vote)| vote.accepted && vote.ballot == ballot)
+        {
+            return None;
+        }
+        let known = |robot: &RobotId| self.holds_past(closing, *robot);
+        let promise =
+            |robot| views.promises(robot).find(|vote| vote.ballot == ballot).filter(|_| known(&robot));
+        let promises: Vec<&Vote> = views.staying(asked).map(promise).collect::<Option<_>>()?;
+        let accepted = views.staying(asked).flat_map(|robot| views.votes_of(robot));
+        let accepted = accepted.map(|(_, vote)| (vote.ballot, vote)).filter(|(_, vote)| vote.accepted);
+        if let Some(bound) = rules::bound(accepted, ballot) {
+            return Some(Vote { ballot, ..bound.clone() });
+        }
+        let mut held: BTreeMap<LogId, u64> = BTreeMap::new();
+        for (log, length) in promises.iter().flat_map(|vote| &vote.held) {
+            let slot = held.entry(*log).or_insert(0);
+            *slot = (*slot).max(*length);
+        }
+        let admit = wish.admit.iter().filter(|(robot, _)| !views.is_active(**robot));
+        Some(Vote {
+            accepted: true,
+            held: held.into_iter().collect(),
+            added: admit.map(|(robot, boot)| (*robot, *boot)).collect(),
+            from: promises.iter().map(|vote| vote.from).max().unwrap_or(Timestamp::MIN),
+            ..asked.clone()
+        })
+    }
+
     /// A promise: what is held here of the logs of those who are to go, and how far this robot has sealed.
     fn promise_of(&self, closing: &Closing, ballot: Ballot, removed: Vec<RobotId>, operator: bool) -> Vote {
         let known = self.logs.iter().filter(|(id, log)| log.held() > 0 && removed.contains(&id.robot));
+        // What is forgotten was held to its end.
+        let floors = closing.base.floors.iter().filter(|(robot, _)| removed.contains(robot));
+        let over = floors.filter_map(|(robot, floor)| {
+            Some((LogId { robot: *robot, boot: BootIndex(floor.0.checked_sub(1)?) }, WHOLE))
+        });
+        let held: BTreeMap<LogId, u64> = known.map(|(id, log)| (*id, log.held())).chain(over).collect();
         Vote {
             epoch: closing.views.epoch,
             ballot,
             accepted: false,
-            held: known.map(|(id, log)| (*id, log.held())).collect(),
+            held: held.into_iter().collect(),
             removed,
             added: Vec::new(),
             from: self.seal_of(closing.owner).map_or(Timestamp::MIN, |seal| seal.observed),
@@ -120,36 +161,4 @@ fn accept(closing: &Closing) -> Option<Vote> {
             !vote.removed.contains(&owner) && rules::may_accept(promised, vote.ballot) && fresh(vote)
         })
         .cloned()
-}
-
-/// Proposes in its own ballot, once all who would stay have promised it.
-fn propose(closing: &Closing, wish: &Wish) -> Option<Vote> {
-    let (views, owner) = (&closing.views, closing.owner);
-    let asked = views.promises(owner).next_back().filter(|vote| vote.ballot.robot == owner)?;
-    let ballot = asked.ballot;
-    if views.ballot(owner) != Some(ballot)
-        || views.votes_of(owner).any(|(_, vote)| vote.accepted && vote.ballot == ballot)
-    {
-        return None;
-    }
-    let promise = |robot| views.promises(robot).find(|vote| vote.ballot == ballot);
-    let promises: Vec<&Vote> = views.staying(asked).map(promise).collect::<Option<_>>()?;
-    let accepted = views.staying(asked).flat_map(|robot| views.votes_of(robot));
-    let accepted = accepted.map(|(_, vote)| (vote.ballot, vote)).filter(|(_, vote)| vote.accepted);
-    if let Some(bound) = rules::bound(accepted, ballot) {
-        return Some(Vote { ballot, ..bound.clone() });
-    }
-    let mut held: BTreeMap<LogId, u64> = BTreeMap::new();
-    for (log, length) in promises.iter().flat_map(|vote| &vote.held) {
-        let slot = held.entry(*log).or_insert(0);
-        *slot = (*slot).max(*length);
-    }
-    let admit = wish.admit.iter().filter(|(robot, _)| !views.is_active(**robot));
-    Some(Vote {
-        accepted: true,
-        held: held.into_iter().collect(),
-        added: admit.map(|(robot, boot)| (*robot, *boot)).collect(),
-        from: promises.iter().map(|vote| vote.from).max().unwrap_or(Timestamp::MIN),
-        ..asked.clone()
-    })
 }
