@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use pleiad_physics::Effect;
 use pleiad_recording::Recording;
 
 use crate::diagnosis;
@@ -39,6 +40,8 @@ pub struct DiagnoseOptions {
     pub test_on: Vec<String>,
     /// How ground truth is used.
     pub truth: TruthUse,
+    /// Effects of the catalogue that are not tried: what becomes of them without their names.
+    pub without: Vec<Effect>,
 }
 
 /// Compares, locates, names, models.

@@ -45,10 +45,11 @@ pub use diagnosis::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit
 pub use error::MismatchError;
 pub use evidence::Evidence;
 pub use findings::{
-    Estimate, Finding, Findings, HeldOut, Place, RobotRollOuts, RollOut, Undetected, Untestable, Verdict,
+    Estimate, Finding, Findings, HeldOut, Place, RobotRollOuts, RollOut, Shape, Undetected, Untestable,
+    Verdict,
 };
 pub use model::{nominal_model, nominal_models};
 pub use residual::{ChannelResiduals, Omission, Regime, Residual};
 pub use rollout::{HORIZONS_S, Rollout, rollouts};
 pub use summary::{MIN_RESIDUALS, Summary, summarize};
-pub use view::{PartialResidual, Plots, ResidualSeries};
+pub use view::{PartialResidual, Plots, ResidualSeries, ShapePlot};

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use pleiad_estimation::RobotId;
-use pleiad_physics::{Floors, RobotModel};
+use pleiad_physics::{Effect, Floors, RobotModel};
 use pleiad_recording::Recording;
 
 use crate::builtin;
@@ -14,6 +14,7 @@ use crate::diagnosis::fit::{Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
 use crate::diagnosis::lag::paired;
 use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, judge};
+use crate::diagnosis::open::open;
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
 use crate::diagnosis::select::{Entry, Pool, Selected, select};
@@ -73,6 +74,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let tests: Vec<&Unit<'_>> =
         all.iter().filter(|unit| prepared[unit.recording].tested && !unit.rows.is_empty()).collect();
     let mut entries = entries(&fitted);
+    leave_out(&mut entries, &options.without);
     let tried = entries.entries.len() + entries.untestable.len();
     let spread_entries = spread::take(&mut entries, &units);
 
@@ -91,6 +93,9 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
     let spread = spread::spread(&units, &tests, &fit, &spread_entries, &swaps, count);
     spread.explain(&mut judgements, &mut notes);
+    let recorded: Vec<String> = prepared.iter().map(|own| own.recording.name.clone()).collect();
+    let opened = open(&units, &tests, &recorded, &fit, &spread, count);
+    opened.displace(&mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
@@ -105,7 +110,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         }
     }
     let named = |group: &&Vec<usize>| found.iter().any(|own| own.group == **group);
-    let unexplained = groups.iter().filter(|group| !spread.explains(group[0]));
+    let explained = |term: usize| spread.explains(term) || opened.displaced.contains(&term);
+    let unexplained = groups.iter().filter(|group| !explained(group[0]));
     notes.extend(unexplained.filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
     notes.extend(spread.nuisances());
     notes.extend(
@@ -120,6 +126,9 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let rolled = rolled::robots(&roller, &kept);
     let mut findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
     findings.extend(spread.found().into_iter().map(SpreadTerm::finding));
+    let named_count = findings.len();
+    findings.extend(opened.found.iter().map(|own| own.finding.clone()));
+    notes.extend(opened.notes.iter().cloned());
     let mut undetected = undetected(&units, &scored, count);
     undetected.extend_from_slice(&spread.undetected);
     entries.untestable.extend_from_slice(&spread.untestable);
@@ -142,12 +151,20 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         roll_outs: rolled::per_robot(&rolled, &units),
         notes,
     };
-    let plots = series::plots(&prepared, &units, &fit, &kept, &found);
+    let mut plots = series::plots(&prepared, &units, &fit, &kept, &found);
+    opened.plot(named_count, &mut plots);
     let corrected = prepared
         .iter()
         .map(|own| (own.recording.name.clone(), corrected::corrected(own, &corrected_terms)))
         .collect();
     Ok(Diagnosis { findings, plots, corrected })
+}
+
+/// Takes effects out of what is tried.
+fn leave_out(entries: &mut Entries, without: &[Effect]) {
+    entries.entries.retain(|(effect, _)| !without.contains(effect));
+    let named = |own: &Untestable| without.iter().any(|effect| effect.name() == own.effect);
+    entries.untestable.retain(|own| !named(own));
 }
 
 /// For each recording whether it is tested on; `None` if it is not used.
@@ -302,6 +319,7 @@ fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgem
             log_score_gain_se: own.gain.standard_error,
             rollout_rmse: rolled::of_finding(rolled, units, own),
         },
+        shape: None,
         manoeuvre,
         // Sentences are the reader's: who writes the findings fills this.
         summary: String::new(),
@@ -310,7 +328,7 @@ fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgem
 }
 
 impl Judgement {
-    fn name(&self) -> &'static str {
+    pub(crate) fn name(&self) -> &'static str {
         self.judged.estimated[0].term.effect.name()
     }
 
@@ -338,7 +356,7 @@ fn hidden(units: &[&Unit<'_>], entries: &[Entry], fit: &Fit, pool: &Pool) -> Vec
 
 /// That nothing is missing is said if, of what was `tried`, more could be tested than could not.
 fn overall(findings: &[Finding], tried: usize, untestable: usize) -> Verdict {
-    let order = [Verdict::Named, Verdict::BadData, Verdict::CannotTell, Verdict::Unnameable];
+    let order = [Verdict::Named, Verdict::BadData, Verdict::CannotTell, Verdict::Form, Verdict::Unnameable];
     order
         .into_iter()
         .find(|verdict| findings.iter().any(|finding| finding.verdict == *verdict))

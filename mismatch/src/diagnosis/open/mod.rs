@@ -1,0 +1,205 @@
+//! What the catalogue does not explain: is structure left in a robot's residuals, does a product of what it did
+//! describe it, and if none does, what does it look like?
+//!
+//! [`monomial`] is the dictionary, [`target`] and [`motion`] make columns of it, [`bench`] scores them beside what
+//! is fitted ([`picture`]), [`search`] adds forms and curves ([`spline`]), [`rival`] asks whether they do better
+//! than effects that were taken for them, [`tell`] says what was found.
+
+mod bench;
+mod monomial;
+mod motion;
+mod picture;
+mod rival;
+mod search;
+mod spline;
+mod target;
+mod tell;
+
+use std::collections::BTreeSet;
+
+use pleiad_estimation::RobotId;
+use pleiad_physics::Effect;
+
+use crate::channel::Channel;
+use crate::diagnosis::fit::Fit;
+use crate::diagnosis::open::picture::Picture;
+use crate::diagnosis::open::search::{Curve, Form, Ground, MOST};
+use crate::diagnosis::open::target::Target;
+use crate::diagnosis::run::Judgement;
+use crate::diagnosis::spread::Spread;
+use crate::diagnosis::unit::Unit;
+use crate::findings::Finding;
+use crate::parallel;
+use crate::view::{PartialResidual, Plots, ShapePlot};
+
+/// A rest that gains less than this share of what the forms of a target gain leaves them their names.
+const REST: f64 = 0.25;
+/// The most curves of a robot.
+const MOST_CURVES: usize = 4;
+
+/// A finding without a name, with what shows it; the number of the finding is the caller's.
+pub(crate) struct Unnamed {
+    pub(crate) finding: Finding,
+    pub(crate) partial: Vec<PartialResidual>,
+    pub(crate) shapes: Vec<ShapePlot>,
+}
+
+/// What the search says.
+#[derive(Default)]
+pub(crate) struct Opened {
+    pub(crate) found: Vec<Unnamed>,
+    /// Terms of the fit that a form makes needless.
+    pub(crate) displaced: BTreeSet<usize>,
+    pub(crate) notes: Vec<String>,
+}
+
+/// What was found of one robot.
+pub(crate) struct Hypothesis<'u, 'a> {
+    /// What is fitted: terms, then curves, then forms.
+    pub(crate) picture: Picture<'u, 'a>,
+    /// The terms alone.
+    pub(crate) base: Picture<'u, 'a>,
+    pub(crate) forms: Vec<Form>,
+    pub(crate) curves: Vec<Curve>,
+    pub(crate) notes: Vec<String>,
+}
+
+/// Effects of spread that also move the mean of what they show in, from one instant to the next.
+const WANDERING: [Effect; 6] = [
+    Effect::GyroRandomWalk,
+    Effect::CommandJitter,
+    Effect::CommandLoss,
+    Effect::IdentityMixUp,
+    Effect::LandmarkIdentitySwap,
+    Effect::EncoderCoarse,
+];
+
+/// Searches what a fit leaves in every robot's residuals, among so many other tests; `held` are units of other
+/// recordings to test on.
+pub(crate) fn open(
+    units: &[&Unit<'_>],
+    held: &[&Unit<'_>],
+    names: &[String],
+    fit: &Fit,
+    spread: &Spread,
+    tests: usize,
+) -> Opened {
+    let robots: BTreeSet<RobotId> = units.iter().map(|unit| unit.robot).collect();
+    let robots: Vec<RobotId> = robots.into_iter().collect();
+    let grounds: Vec<Ground<'_, '_>> = robots
+        .iter()
+        .map(|&robot| {
+            let own: Vec<&Unit<'_>> = units.iter().copied().filter(|unit| unit.robot == robot).collect();
+            Ground::new(own, &fit.terms, &wandering(spread, robot))
+        })
+        .collect();
+    let tests = tests + grounds.iter().map(Ground::tests).sum::<usize>();
+    let each = parallel::map(&robots.iter().zip(&grounds).collect::<Vec<_>>(), |(robot, ground)| {
+        let base = Picture::new(units, fit, **robot);
+        let first = hypothesis(ground, base, tests);
+        if first.forms.is_empty() && first.curves.is_empty() {
+            return Opened { notes: first.notes, ..Opened::default() };
+        }
+        let (kept, displaced) = rival::compared(ground, fit, **robot, first, tests);
+        let mut told = tell::told(ground, held, names, **robot, &kept, tests);
+        told.displaced = displaced;
+        told
+    });
+    let mut all = Opened::default();
+    for own in each {
+        all.found.extend(own.found);
+        all.displaced.extend(own.displaced);
+        all.notes.extend(own.notes);
+    }
+    all.found.sort_by(|a, b| b.finding.held_out.log_score_gain.total_cmp(&a.finding.held_out.log_score_gain));
+    all
+}
+
+impl Opened {
+    /// Takes from terms of the fit what forms explain better; says so.
+    pub(crate) fn displace(&self, judgements: &mut [Judgement], notes: &mut Vec<String>) {
+        for own in judgements {
+            if own.judged.verdict.is_some() && own.group.iter().any(|term| self.displaced.contains(term)) {
+                own.judged.verdict = None;
+                notes.push(format!("{} is no finding: what has no name explains it better", own.name()));
+            }
+        }
+    }
+
+    /// Adds what shows the findings, which begin at a number.
+    pub(crate) fn plot(&self, first: usize, plots: &mut Plots) {
+        for (index, own) in self.found.iter().enumerate() {
+            let finding = first + index;
+            plots.partial.extend(own.partial.iter().map(|one| PartialResidual { finding, ..one.clone() }));
+            plots.shapes.extend(own.shapes.iter().map(|one| ShapePlot { finding, ..one.clone() }));
+        }
+    }
+}
+
+/// Targets in channels that a finding of spread moves about.
+fn wandering(spread: &Spread, robot: RobotId) -> Vec<Target> {
+    let found = spread.found();
+    let own = found.iter().filter(|own| own.robots.contains(&robot));
+    let channels: Vec<Channel> = own
+        .filter(|own| WANDERING.contains(&own.judged.estimated[0].term.effect))
+        .flat_map(|own| match own.judged.estimated[0].term.effect {
+            Effect::GyroRandomWalk => vec![Channel::Gyro],
+            Effect::CommandJitter | Effect::CommandLoss => vec![Channel::Actuator],
+            Effect::EncoderCoarse => vec![Channel::Actuator, Channel::Body, Channel::Gyro],
+            _ => Channel::SIGHTINGS.as_flattened().to_vec(),
+        })
+        .collect();
+    let shows = |target: &Target| target.channels().iter().any(|(channel, _)| channels.contains(channel));
+    Target::ALL.into_iter().filter(shows).collect()
+}
+
+/// Forms beside a base, and curves where they do not suffice.
+pub(crate) fn hypothesis<'u, 'a>(
+    ground: &Ground<'u, 'a>,
+    base: Picture<'u, 'a>,
+    tests: usize,
+) -> Hypothesis<'u, 'a> {
+    let (_, mut forms) = ground.forms(&base, tests);
+    let mut curves: Vec<Curve> = Vec::new();
+    let mut notes = Vec::new();
+    let mut closed: BTreeSet<Target> = BTreeSet::new();
+    let mut picture = built(&base, &curves, &forms);
+    while curves.len() < MOST_CURVES {
+        let open = ground.targets.iter().copied().filter(|target| !closed.contains(target));
+        let left = open.filter_map(|target| ground.curve(&picture, target, tests));
+        let Some(rest) = left.reduce(|a, b| if b.gain > a.gain { b } else { a }) else { break };
+        let target = rest.target;
+        closed.insert(target);
+        let others: Vec<Form> = forms.iter().filter(|own| own.target != target).cloned().collect();
+        let bare = built(&base, &curves, &others);
+        let own = forms.len() - others.len();
+        let by_forms = 2.0 * (picture.log_likelihood() - bare.log_likelihood()) / rest.inflation.max(1.0);
+        if own > 0 && own < MOST && rest.gain < REST * by_forms {
+            notes.push(format!(
+                "robot {}: the form of the {} leaves a rest over {}: it is a description, not the whole",
+                ground.units[0].robot,
+                target.words().0,
+                rest.regressor.symbol().0
+            ));
+            continue;
+        }
+        let Some(curve) = (if own > 0 { ground.curve(&bare, target, tests) } else { Some(rest) }) else {
+            continue;
+        };
+        let with = bare.with(&curve.all_columns());
+        if !tell::curve_matters(ground, target, &with, &bare) {
+            continue;
+        }
+        curves.push(curve);
+        forms = others;
+        picture = built(&base, &curves, &forms);
+    }
+    Hypothesis { picture, base, forms, curves, notes }
+}
+
+/// A base with curves and forms.
+pub(crate) fn built<'u, 'a>(base: &Picture<'u, 'a>, curves: &[Curve], forms: &[Form]) -> Picture<'u, 'a> {
+    let mut columns: Vec<_> = curves.iter().flat_map(Curve::all_columns).collect();
+    columns.extend(forms.iter().map(|form| form.columns.clone()));
+    if columns.is_empty() { base.clone() } else { base.with(&columns) }
+}

@@ -1,0 +1,254 @@
+//! The search for forms in what one robot's residuals leave, and for curves where forms do not suffice.
+
+use std::collections::BTreeMap;
+
+use crate::diagnosis::open::bench::{Bench, Score};
+use crate::diagnosis::open::monomial::{Base, Monomial, of_motion, of_reading, of_sighting};
+use crate::diagnosis::open::motion::Motions;
+use crate::diagnosis::open::picture::Picture;
+use crate::diagnosis::open::spline::Basis;
+use crate::diagnosis::open::target::Target;
+use crate::diagnosis::select::{FAMILYWISE, LEAST_GAIN};
+use crate::diagnosis::support::ODDS;
+use crate::diagnosis::term::Term;
+use crate::diagnosis::unit::{Column, Unit};
+
+/// The most forms that one target has, and one robot.
+pub(crate) const MOST: usize = 3;
+const MOST_OF_ROBOT: usize = 8;
+/// A form that is this likely without it beside the others is dropped.
+const PRUNE: f64 = 1e-4;
+/// So many equivalent forms are told.
+const TOLD: usize = 6;
+/// Standard errors by which a size must exceed what is harmless.
+const NEAR_END: f64 = 3.0;
+
+/// A form that was found.
+#[derive(Clone, Debug)]
+pub(crate) struct Form {
+    pub(crate) target: Target,
+    pub(crate) monomial: Monomial,
+    pub(crate) columns: Vec<Column>,
+    /// Forms that explain it about as well on these data.
+    pub(crate) equivalent: Vec<Monomial>,
+    pub(crate) inflation: f64,
+}
+
+/// A curve that was found.
+#[derive(Clone, Debug)]
+pub(crate) struct Curve {
+    pub(crate) target: Target,
+    pub(crate) regressor: Base,
+    pub(crate) basis: Basis,
+    /// Positions of the knots whose functions are there, with their columns by unit.
+    pub(crate) columns: Vec<(usize, Vec<Column>)>,
+    pub(crate) p: f64,
+    pub(crate) gain: f64,
+    pub(crate) inflation: f64,
+}
+
+/// What is looked for in one robot.
+pub(crate) struct Ground<'u, 'a> {
+    pub(crate) units: Vec<&'u Unit<'a>>,
+    pub(crate) motions: Vec<Motions>,
+    pub(crate) targets: Vec<Target>,
+    dictionaries: BTreeMap<Target, Vec<Monomial>>,
+}
+
+impl<'u, 'a> Ground<'u, 'a> {
+    pub(crate) fn new(units: Vec<&'u Unit<'a>>, terms: &[Term], skipped: &[Target]) -> Self {
+        let recorded = |target: &Target| units.iter().any(|unit| target.is_recorded(unit));
+        let targets: Vec<Target> =
+            Target::ALL.into_iter().filter(|own| recorded(own) && !skipped.contains(own)).collect();
+        let motions = units.iter().map(|unit| Motions::new(unit, terms)).collect();
+        let wheels = units.iter().all(|unit| {
+            unit.evidence.prepared(unit.robot).is_some_and(|(track, _)| !track.encoders.is_empty())
+        });
+        let dictionary = |target: &Target| match target {
+            Target::SetSpeed | Target::SetYawRate => of_motion(false),
+            Target::Forward | Target::Left | Target::YawRate | Target::Gyro => of_motion(wheels),
+            Target::GpsForward | Target::GpsLeft | Target::Heading => of_reading(),
+            Target::Range | Target::Bearing => of_sighting(),
+        };
+        let dictionaries = targets.iter().map(|target| (*target, dictionary(target))).collect();
+        Self { units, motions, targets, dictionaries }
+    }
+
+    /// How many forms and curves are tried.
+    pub(crate) fn tests(&self) -> usize {
+        self.dictionaries.iter().map(|(target, all)| all.len() + target.regressors().len()).sum()
+    }
+
+    /// What a form of this degree costs, twice in log-likelihood: there are so many of them.
+    pub(crate) fn price(&self, target: Target, monomial: &Monomial) -> f64 {
+        let degree = monomial.degree();
+        let alike = self
+            .dictionaries
+            .get(&target)
+            .map_or(1, |all| all.iter().filter(|other| other.degree() <= degree).count());
+        2.0 * (alike.max(1) as f64).ln()
+    }
+
+    pub(crate) fn columns(
+        &self,
+        target: Target,
+        function: &(dyn Fn(&[f64; 12]) -> f64 + Sync),
+    ) -> Vec<Column> {
+        let own = |(unit, motions): (&&Unit<'_>, &Motions)| target.column(unit, motions, function);
+        self.units.iter().zip(&self.motions).map(own).collect()
+    }
+
+    /// The root mean square of columns in the component that shows the target most.
+    pub(crate) fn size(&self, target: Target, columns: &[Column]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for (unit, column) in self.units.iter().zip(columns) {
+            let Some((which, component)) = target.main(unit) else { continue };
+            let stretch = &unit.stretches[which];
+            count += stretch.rows;
+            if let Some(part) = &column.parts[which] {
+                sum +=
+                    part.iter().skip(component).step_by(stretch.components).map(|own| own * own).sum::<f64>();
+            }
+        }
+        (sum / count.max(1) as f64).sqrt()
+    }
+
+    /// The greatest size that does not matter.
+    pub(crate) fn bound(&self, target: Target) -> f64 {
+        let Some(unit) = self.units.first() else { return f64::INFINITY };
+        let of = |(coefficient, monomial): &(f64, Monomial)| {
+            coefficient * self.size(target, &self.columns(target, &|at| monomial.value(at)))
+        };
+        target.harmless(unit).iter().map(of).fold(0.0, f64::max)
+    }
+
+    fn matters(&self, target: Target, columns: &[Column], score: &Score, bound: f64) -> bool {
+        (score.change.abs() - NEAR_END * score.error) * self.size(target, columns) > bound
+    }
+
+    /// The best form of all targets that may have one more.
+    fn best(&self, picture: &Picture<'_, '_>, forms: &[Form], tests: usize) -> Option<Form> {
+        let mut best: Option<(f64, Form)> = None;
+        for &target in &self.targets {
+            if forms.iter().filter(|own| own.target == target).count() >= MOST {
+                continue;
+            }
+            let Some(bench) = Bench::new(picture, target) else { continue };
+            let bound = self.bound(target);
+            let mut scored: Vec<(f64, &Monomial, Vec<Column>, f64)> = Vec::new();
+            let mut alike: Vec<(f64, &Monomial)> = Vec::new();
+            for monomial in &self.dictionaries[&target] {
+                let columns = self.columns(target, &|at| monomial.value(at));
+                let Some(score) = bench.score(&columns) else { continue };
+                let worth = score.deflated() - self.price(target, monomial);
+                alike.push((worth, monomial));
+                let clear = score.p * tests as f64 <= FAMILYWISE && score.deflated() > LEAST_GAIN;
+                if clear && self.matters(target, &columns, &score, bound) {
+                    scored.push((worth, monomial, columns, score.inflation));
+                }
+            }
+            let first = scored.into_iter().reduce(|a, b| if b.0 > a.0 { b } else { a });
+            let Some((worth, monomial, columns, inflation)) = first else { continue };
+            if best.as_ref().is_some_and(|(most, _)| *most >= worth) {
+                continue;
+            }
+            alike.retain(|(own, other)| *own > worth - ODDS && *other != monomial);
+            alike.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let equivalent = alike.into_iter().take(TOLD).map(|(_, other)| other.clone()).collect();
+            let monomial = monomial.clone();
+            best = Some((worth, Form { target, monomial, columns, equivalent, inflation }));
+        }
+        best.map(|(_, form)| form)
+    }
+
+    /// Adds forms as long as one is significant; drops those that no longer are.
+    pub(crate) fn forms<'p>(&self, base: &Picture<'p, 'a>, tests: usize) -> (Picture<'p, 'a>, Vec<Form>) {
+        let mut forms: Vec<Form> = Vec::new();
+        let mut picture = base.clone();
+        for _ in 0..2 * MOST_OF_ROBOT {
+            if forms.len() >= MOST_OF_ROBOT {
+                break;
+            }
+            let Some(form) = self.best(&picture, &forms, tests) else { break };
+            picture = picture.with(std::slice::from_ref(&form.columns));
+            forms.push(form);
+            while let Some(weakest) = self.weakest(&picture, &forms) {
+                picture = picture.without(&[picture.size() - forms.len() + weakest]);
+                let dropped = forms.remove(weakest);
+                if weakest == forms.len() {
+                    // The last one added: there is no more to gain.
+                    drop(dropped);
+                    return (picture, forms);
+                }
+            }
+        }
+        (picture, forms)
+    }
+
+    /// The form that is least needed beside the others, if it is not needed.
+    fn weakest(&self, picture: &Picture<'_, '_>, forms: &[Form]) -> Option<usize> {
+        let p = |position: usize| self.beside(picture, forms, position).map_or(1.0, |score| score.p);
+        let all = (0..forms.len()).map(|position| (p(position), position));
+        all.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(p, _)| *p > PRUNE).map(|(_, position)| position)
+    }
+
+    /// What a form gains beside everything else.
+    pub(crate) fn beside(&self, picture: &Picture<'_, '_>, forms: &[Form], position: usize) -> Option<Score> {
+        let form = &forms[position];
+        let without = picture.without(&[picture.size() - forms.len() + position]);
+        // Noise is that of the whole: what the form explains is not noise.
+        let mut without = without;
+        for (own, whole) in without.states.iter_mut().zip(&picture.states) {
+            own.noise = whole.noise.clone();
+        }
+        Bench::new(&without, form.target)?.score(&form.columns)
+    }
+
+    /// The best curve of a target beside a picture.
+    pub(crate) fn curve(&self, picture: &Picture<'_, '_>, target: Target, tests: usize) -> Option<Curve> {
+        let bench = Bench::new(picture, target)?;
+        let instants: Vec<Vec<[f64; 12]>> = self
+            .units
+            .iter()
+            .zip(&self.motions)
+            .map(|(unit, motions)| target.instants(unit, motions))
+            .collect();
+        let rows: usize = instants.iter().map(Vec::len).sum();
+        let mut best: Option<(f64, Curve)> = None;
+        for &regressor in target.regressors() {
+            let values: Vec<f64> = instants.iter().flatten().map(|at| at[regressor as usize]).collect();
+            let Some(basis) = Basis::new(&values) else { continue };
+            let all: Vec<(usize, Vec<Column>)> = (0..basis.knots.len())
+                .map(|knot| (knot, self.columns(target, &|at| basis.value(knot, at[regressor as usize]))))
+                .collect();
+            // Beside a constant that is fitted the height of the curve says nothing: it is zero in the middle.
+            let middle = basis.knots.len() / 2;
+            let bent: Vec<(usize, Vec<Column>)> =
+                all.iter().filter(|(knot, _)| *knot != middle).cloned().collect();
+            let score = |own: &[(usize, Vec<Column>)]| {
+                let columns: Vec<Vec<Column>> = own.iter().map(|(_, columns)| columns.clone()).collect();
+                bench.score_together(&columns)
+            };
+            let Some((columns, found)) =
+                score(&all).map(|own| (all, own)).or_else(|| score(&bent).map(|own| (bent, own)))
+            else {
+                continue;
+            };
+            if found.p * tests as f64 > FAMILYWISE || found.deflated() <= LEAST_GAIN {
+                continue;
+            }
+            let worth = found.deflated() - columns.len() as f64 * (rows.max(2) as f64).ln();
+            if best.as_ref().is_none_or(|(most, _)| worth > *most) {
+                let (p, gain, inflation) = (found.p, found.deflated(), found.inflation);
+                best = Some((worth, Curve { target, regressor, basis, columns, p, gain, inflation }));
+            }
+        }
+        best.map(|(_, curve)| curve)
+    }
+}
+
+impl Curve {
+    pub(crate) fn all_columns(&self) -> Vec<Vec<Column>> {
+        self.columns.iter().map(|(_, columns)| columns.clone()).collect()
+    }
+}
