@@ -11,7 +11,11 @@ use pleiad_sim_peers::simulate;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let name = arguments.next().unwrap_or_default();
+    let mut name = arguments.next().unwrap_or_default();
+    let known = name == "with";
+    if known {
+        name = arguments.next().unwrap_or_default();
+    }
     let seeds: Vec<u64> = arguments.filter_map(|own| own.parse().ok()).collect();
     for seed in seeds {
         let mut runs = Vec::new();
@@ -20,7 +24,8 @@ fn main() {
             runs.push((group.scenario(), vec![], Vec::new()));
         } else {
             for case in cases_named(&name).unwrap_or_default() {
-                runs.push((case.scenario, vec![case.effect], case.values));
+                let without = if known { Vec::new() } else { vec![case.effect] };
+                runs.push((case.scenario, without, case.values));
             }
         }
         for (scenario, without, values) in runs {

@@ -91,11 +91,11 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     entries.untestable.extend(hidden(&units, &entries.entries, &fit, &pool));
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, &pool, count);
-    let spread = spread::spread(&units, &tests, &fit, &spread_entries, &swaps, count);
+    let mut spread = spread::spread(&units, &tests, &fit, &spread_entries, &swaps, count);
     spread.explain(&mut judgements, &mut notes);
     let recorded: Vec<String> = prepared.iter().map(|own| own.recording.name.clone()).collect();
     let opened = open(&units, &tests, &recorded, &fit, &spread, count);
-    opened.displace(&mut judgements, &mut notes);
+    opened.displace(&mut judgements, &mut spread, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {

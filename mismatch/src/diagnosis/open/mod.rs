@@ -23,7 +23,7 @@ use pleiad_physics::Effect;
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::open::picture::Picture;
-use crate::diagnosis::open::search::{Curve, Form, Ground, MOST};
+use crate::diagnosis::open::search::{Curve, Form, Ground};
 use crate::diagnosis::open::target::Target;
 use crate::diagnosis::run::Judgement;
 use crate::diagnosis::spread::Spread;
@@ -33,7 +33,7 @@ use crate::parallel;
 use crate::view::{PartialResidual, Plots, ShapePlot};
 
 /// A rest that gains less than this share of what the forms of a target gain leaves them their names.
-const REST: f64 = 0.25;
+const REST: f64 = 0.05;
 /// The most curves of a robot.
 const MOST_CURVES: usize = 4;
 
@@ -48,6 +48,8 @@ pub(crate) struct Unnamed {
 #[derive(Default)]
 pub(crate) struct Opened {
     pub(crate) found: Vec<Unnamed>,
+    /// What is off on which robot, named or not.
+    unexplained: Vec<(RobotId, Target)>,
     /// Terms of the fit that a form makes needless.
     pub(crate) displaced: BTreeSet<usize>,
     pub(crate) notes: Vec<String>,
@@ -61,18 +63,14 @@ pub(crate) struct Hypothesis<'u, 'a> {
     pub(crate) base: Picture<'u, 'a>,
     pub(crate) forms: Vec<Form>,
     pub(crate) curves: Vec<Curve>,
+    /// Targets whose forms are not the whole: more would be needed than one may have.
+    pub(crate) short: BTreeSet<Target>,
     pub(crate) notes: Vec<String>,
 }
 
 /// Effects of spread that also move the mean of what they show in, from one instant to the next.
-const WANDERING: [Effect; 6] = [
-    Effect::GyroRandomWalk,
-    Effect::CommandJitter,
-    Effect::CommandLoss,
-    Effect::IdentityMixUp,
-    Effect::LandmarkIdentitySwap,
-    Effect::EncoderCoarse,
-];
+const WANDERING: [Effect; 4] =
+    [Effect::GyroRandomWalk, Effect::IdentityMixUp, Effect::LandmarkIdentitySwap, Effect::EncoderCoarse];
 
 /// Searches what a fit leaves in every robot's residuals, among so many other tests; `held` are units of other
 /// recordings to test on.
@@ -97,18 +95,23 @@ pub(crate) fn open(
     let each = parallel::map(&robots.iter().zip(&grounds).collect::<Vec<_>>(), |(robot, ground)| {
         let base = Picture::new(units, fit, **robot);
         let first = hypothesis(ground, base, tests);
-        if first.forms.is_empty() && first.curves.is_empty() {
+        if first.forms.is_empty() && first.curves.is_empty() && rival::places(units, fit, **robot).is_empty()
+        {
             return Opened { notes: first.notes, ..Opened::default() };
         }
-        let (kept, displaced) = rival::compared(ground, fit, **robot, first, tests);
+        let places = rival::places(units, fit, **robot);
+        let (kept, displaced) = rival::compared(ground, fit, **robot, first, &places, tests);
         let mut told = tell::told(ground, held, names, **robot, &kept, tests);
         told.displaced = displaced;
+        let targets = kept.forms.iter().map(|own| own.target).chain(kept.curves.iter().map(|own| own.target));
+        told.unexplained = targets.map(|target| (**robot, target)).collect();
         told
     });
     let mut all = Opened::default();
     for own in each {
         all.found.extend(own.found);
         all.displaced.extend(own.displaced);
+        all.unexplained.extend(own.unexplained);
         all.notes.extend(own.notes);
     }
     all.found.sort_by(|a, b| b.finding.held_out.log_score_gain.total_cmp(&a.finding.held_out.log_score_gain));
@@ -117,11 +120,30 @@ pub(crate) fn open(
 
 impl Opened {
     /// Takes from terms of the fit what forms explain better; says so.
-    pub(crate) fn displace(&self, judgements: &mut [Judgement], notes: &mut Vec<String>) {
+    pub(crate) fn displace(
+        &self,
+        judgements: &mut [Judgement],
+        spread: &mut Spread,
+        notes: &mut Vec<String>,
+    ) {
         for own in judgements {
             if own.judged.verdict.is_some() && own.group.iter().any(|term| self.displaced.contains(term)) {
                 own.judged.verdict = None;
                 notes.push(format!("{} is no finding: what has no name explains it better", own.name()));
+            }
+        }
+        // How wide residuals scatter cannot be judged where their mean is not explained.
+        for own in &mut spread.terms {
+            let shows = |(robot, target): &(RobotId, Target)| {
+                own.robots.contains(robot)
+                    && target.channels().iter().any(|(channel, _)| *channel == own.judged.channel)
+            };
+            if own.judged.verdict.is_some() && self.unexplained.iter().any(shows) {
+                own.judged.verdict = None;
+                let name = own.judged.estimated[0].term.effect.name();
+                notes.push(format!(
+                    "{name} is no finding: something without a name shows in the same channel"
+                ));
             }
         }
     }
@@ -144,7 +166,6 @@ fn wandering(spread: &Spread, robot: RobotId) -> Vec<Target> {
         .filter(|own| WANDERING.contains(&own.judged.estimated[0].term.effect))
         .flat_map(|own| match own.judged.estimated[0].term.effect {
             Effect::GyroRandomWalk => vec![Channel::Gyro],
-            Effect::CommandJitter | Effect::CommandLoss => vec![Channel::Actuator],
             Effect::EncoderCoarse => vec![Channel::Actuator, Channel::Body, Channel::Gyro],
             _ => Channel::SIGHTINGS.as_flattened().to_vec(),
         })
@@ -159,7 +180,7 @@ pub(crate) fn hypothesis<'u, 'a>(
     base: Picture<'u, 'a>,
     tests: usize,
 ) -> Hypothesis<'u, 'a> {
-    let (_, mut forms) = ground.forms(&base, tests);
+    let (_, mut forms, mut short) = ground.forms(&base, tests);
     let mut curves: Vec<Curve> = Vec::new();
     let mut notes = Vec::new();
     let mut closed: BTreeSet<Target> = BTreeSet::new();
@@ -168,13 +189,14 @@ pub(crate) fn hypothesis<'u, 'a>(
         let open = ground.targets.iter().copied().filter(|target| !closed.contains(target));
         let left = open.filter_map(|target| ground.curve(&picture, target, tests));
         let Some(rest) = left.reduce(|a, b| if b.gain > a.gain { b } else { a }) else { break };
+        let exhausted = !short.contains(&rest.target);
         let target = rest.target;
         closed.insert(target);
         let others: Vec<Form> = forms.iter().filter(|own| own.target != target).cloned().collect();
         let bare = built(&base, &curves, &others);
         let own = forms.len() - others.len();
         let by_forms = 2.0 * (picture.log_likelihood() - bare.log_likelihood()) / rest.inflation.max(1.0);
-        if own > 0 && own < MOST && rest.gain < REST * by_forms {
+        if own > 0 && exhausted && rest.gain < REST * by_forms {
             notes.push(format!(
                 "robot {}: the form of the {} leaves a rest over {}: it is a description, not the whole",
                 ground.units[0].robot,
@@ -187,14 +209,16 @@ pub(crate) fn hypothesis<'u, 'a>(
             continue;
         };
         let with = bare.with(&curve.all_columns());
-        if !tell::curve_matters(ground, target, &with, &bare) {
+        let positions: Vec<usize> = (bare.size()..with.size()).collect();
+        if !tell::curve_matters(ground, target, (&with, &positions), &bare) {
             continue;
         }
         curves.push(curve);
+        short.remove(&target);
         forms = others;
         picture = built(&base, &curves, &forms);
     }
-    Hypothesis { picture, base, forms, curves, notes }
+    Hypothesis { picture, base, forms, curves, short, notes }
 }
 
 /// A base with curves and forms.

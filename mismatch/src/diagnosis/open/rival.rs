@@ -13,9 +13,13 @@ use crate::diagnosis::open::picture::Picture;
 use crate::diagnosis::open::search::{Curve, Form, Ground};
 use crate::diagnosis::open::target::Target;
 use crate::diagnosis::open::{Hypothesis, built, hypothesis};
+use crate::diagnosis::starts::Placing;
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::Unit;
+
+/// What other robots may say of a region, as a share of what one says, for it to be that robot's.
+const OTHERS: f64 = 0.02;
 
 /// The best of: forms beside everything, forms instead of the effects that show in the same channels, and those
 /// forms with the effects that are still needed. With the terms that are not.
@@ -24,6 +28,7 @@ pub(crate) fn compared<'u, 'a>(
     full: &Fit,
     robot: RobotId,
     first: Hypothesis<'u, 'a>,
+    places: &[usize],
     tests: usize,
 ) -> (Hypothesis<'u, 'a>, BTreeSet<usize>) {
     let mut targets: BTreeSet<Target> = first.forms.iter().map(|own| own.target).collect();
@@ -33,7 +38,10 @@ pub(crate) fn compared<'u, 'a>(
         channels.any(|(channel, _)| touches(term.effect, *channel))
     };
     let suspects: Vec<usize> = (0..full.terms.len())
-        .filter(|&term| full.terms[term].whose == Whose::Robot(robot) && shows(&full.terms[term]))
+        .filter(|term| {
+            let own = &full.terms[*term];
+            places.contains(term) || (own.whose == Whose::Robot(robot) && shows(own))
+        })
         .collect();
     if suspects.is_empty() {
         return (first, BTreeSet::new());
@@ -45,13 +53,20 @@ pub(crate) fn compared<'u, 'a>(
     let worth = |own: &Hypothesis<'u, 'a>| {
         let forms: f64 = own.forms.iter().map(|form| price + ground.price(form.target, &form.monomial)).sum();
         let curves: f64 = own.curves.iter().map(|curve| curve.columns.len() as f64 * price).sum();
-        let terms = own.base.slots.len() as f64 * price;
+        let mut slots = own.base.slots.len();
+        for term in &own.base.terms {
+            if term.acts_on(robot) {
+                slots += Placing::of(term.effect.info()).count();
+            }
+        }
+        let terms = slots as f64 * price;
         2.0 * own.picture.log_likelihood() / inflation - forms - curves - terms
     };
     let Some(base) = refitted(&ground.units, full, robot, &suspects) else {
         return (first, BTreeSet::new());
     };
     let second = hypothesis(ground, base, tests);
+    let short = second.short.clone();
     let needed = needed(&first.base, &second, &suspects, full, price * inflation);
     let third = if needed.terms.is_empty() {
         None
@@ -61,7 +76,7 @@ pub(crate) fn compared<'u, 'a>(
         refitted(&ground.units, full, robot, &dropped).map(|base| {
             let picture = built(&base, &needed.curves, &needed.forms);
             let (forms, curves, notes) = (needed.forms, needed.curves, Vec::new());
-            (Hypothesis { picture, base, forms, curves, notes }, dropped)
+            (Hypothesis { picture, base, forms, curves, short: short.clone(), notes }, dropped)
         })
     };
     let mut best = (worth(&first), first, Vec::new());
@@ -72,6 +87,32 @@ pub(crate) fn compared<'u, 'a>(
         }
     }
     (best.1, best.2.into_iter().collect())
+}
+
+/// The terms of the world that are in a region in which only this robot drives: they may be its own.
+pub(crate) fn places(units: &[&Unit<'_>], full: &Fit, robot: RobotId) -> Vec<usize> {
+    let said = |term: usize, own: bool| -> f64 {
+        let of_unit = |(index, unit): (usize, &&Unit<'_>)| -> f64 {
+            let slots = (0..full.slots.len()).filter(|&slot| full.slots[slot].0 == term);
+            let columns = slots.map(|slot| &full.columns[index][slot]);
+            let parts = columns.flat_map(|column| column.parts.iter().zip(&unit.stretches));
+            parts
+                .filter_map(|(part, stretch)| Some((part.as_ref()?, stretch)))
+                .map(|(part, stretch)| {
+                    let sigmas = &full.states[index].noise.sigma[stretch.range()];
+                    part.iter().zip(sigmas).map(|(value, sigma)| (value / sigma).powi(2)).sum::<f64>()
+                })
+                .sum()
+        };
+        units.iter().enumerate().filter(|(_, unit)| (unit.robot == robot) == own).map(of_unit).sum()
+    };
+    let is_place = |term: &usize| {
+        let own = &full.terms[*term];
+        own.whose == Whose::Everyone
+            && Placing::of(own.effect.info()).region.is_some()
+            && said(*term, false) < OTHERS * said(*term, true)
+    };
+    (0..full.terms.len()).filter(is_place).collect()
 }
 
 /// The terms of a robot without some, fitted again.

@@ -1,6 +1,6 @@
 //! The search for forms in what one robot's residuals leave, and for curves where forms do not suffice.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnosis::open::bench::{Bench, Score};
 use crate::diagnosis::open::monomial::{Base, Monomial, of_motion, of_reading, of_sighting};
@@ -14,7 +14,7 @@ use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::{Column, Unit};
 
 /// The most forms that one target has, and one robot.
-pub(crate) const MOST: usize = 3;
+pub(crate) const MOST: usize = 2;
 const MOST_OF_ROBOT: usize = 8;
 /// A form that is this likely without it beside the others is dropped.
 const PRUNE: f64 = 1e-4;
@@ -100,41 +100,56 @@ impl<'u, 'a> Ground<'u, 'a> {
 
     /// The root mean square of columns in the component that shows the target most.
     pub(crate) fn size(&self, target: Target, columns: &[Column]) -> f64 {
+        self.product(target, columns, columns).sqrt()
+    }
+
+    /// The mean product of columns in that component.
+    fn product(&self, target: Target, a: &[Column], b: &[Column]) -> f64 {
         let (mut sum, mut count) = (0.0, 0_usize);
-        for (unit, column) in self.units.iter().zip(columns) {
+        for ((unit, a), b) in self.units.iter().zip(a).zip(b) {
             let Some((which, component)) = target.main(unit) else { continue };
             let stretch = &unit.stretches[which];
             count += stretch.rows;
-            if let Some(part) = &column.parts[which] {
-                sum +=
-                    part.iter().skip(component).step_by(stretch.components).map(|own| own * own).sum::<f64>();
+            if let (Some(a), Some(b)) = (&a.parts[which], &b.parts[which]) {
+                let each = a.iter().zip(b).skip(component).step_by(stretch.components);
+                sum += each.map(|(a, b)| a * b).sum::<f64>();
             }
         }
-        (sum / count.max(1) as f64).sqrt()
+        sum / count.max(1) as f64
     }
 
-    /// The greatest size that does not matter.
-    pub(crate) fn bound(&self, target: Target) -> f64 {
-        let Some(unit) = self.units.first() else { return f64::INFINITY };
+    /// What does not matter in a target.
+    pub(crate) fn harmless(&self, target: Target) -> Vec<Vec<Column>> {
+        let Some(unit) = self.units.first() else { return Vec::new() };
         let of = |(coefficient, monomial): &(f64, Monomial)| {
-            coefficient * self.size(target, &self.columns(target, &|at| monomial.value(at)))
+            self.columns(target, &|at| coefficient * monomial.value(at))
         };
-        target.harmless(unit).iter().map(of).fold(0.0, f64::max)
+        target.harmless(unit).iter().map(of).collect()
     }
 
-    fn matters(&self, target: Target, columns: &[Column], score: &Score, bound: f64) -> bool {
-        (score.change.abs() - NEAR_END * score.error) * self.size(target, columns) > bound
+    /// The greatest size in the direction of columns that does not matter: what a harmless effect has of it, and
+    /// the least of the harmless in any direction.
+    pub(crate) fn bound(&self, target: Target, harmless: &[Vec<Column>], columns: &[Column]) -> f64 {
+        let size = self.size(target, columns).max(f64::MIN_POSITIVE);
+        let along = |own: &Vec<Column>| (self.product(target, own, columns) / size).abs();
+        let least = harmless.iter().map(|own| self.size(target, own)).fold(f64::INFINITY, f64::min);
+        harmless.iter().map(along).fold(least, f64::max)
+    }
+
+    fn matters(&self, target: Target, columns: &[Column], score: &Score, harmless: &[Vec<Column>]) -> bool {
+        let size = (score.change.abs() - NEAR_END * score.error) * self.size(target, columns);
+        size > 0.0 && size > self.bound(target, harmless, columns)
     }
 
     /// The best form of all targets that may have one more.
-    fn best(&self, picture: &Picture<'_, '_>, forms: &[Form], tests: usize) -> Option<Form> {
+    fn best(&self, picture: &Picture<'_, '_>, closed: &BTreeSet<Target>, tests: usize) -> Option<Form> {
         let mut best: Option<(f64, Form)> = None;
         for &target in &self.targets {
-            if forms.iter().filter(|own| own.target == target).count() >= MOST {
+            if closed.contains(&target) {
                 continue;
             }
             let Some(bench) = Bench::new(picture, target) else { continue };
-            let bound = self.bound(target);
+            let harmless = self.harmless(target);
             let mut scored: Vec<(f64, &Monomial, Vec<Column>, f64)> = Vec::new();
             let mut alike: Vec<(f64, &Monomial)> = Vec::new();
             for monomial in &self.dictionaries[&target] {
@@ -143,7 +158,7 @@ impl<'u, 'a> Ground<'u, 'a> {
                 let worth = score.deflated() - self.price(target, monomial);
                 alike.push((worth, monomial));
                 let clear = score.p * tests as f64 <= FAMILYWISE && score.deflated() > LEAST_GAIN;
-                if clear && self.matters(target, &columns, &score, bound) {
+                if clear && self.matters(target, &columns, &score, &harmless) {
                     scored.push((worth, monomial, columns, score.inflation));
                 }
             }
@@ -161,15 +176,25 @@ impl<'u, 'a> Ground<'u, 'a> {
         best.map(|(_, form)| form)
     }
 
-    /// Adds forms as long as one is significant; drops those that no longer are.
-    pub(crate) fn forms<'p>(&self, base: &Picture<'p, 'a>, tests: usize) -> (Picture<'p, 'a>, Vec<Form>) {
+    /// Adds forms as long as one is significant; drops those that no longer are. With the targets that would need
+    /// more than they may have.
+    pub(crate) fn forms<'p>(
+        &self,
+        base: &Picture<'p, 'a>,
+        tests: usize,
+    ) -> (Picture<'p, 'a>, Vec<Form>, BTreeSet<Target>) {
+        let mut short = BTreeSet::new();
         let mut forms: Vec<Form> = Vec::new();
         let mut picture = base.clone();
         for _ in 0..2 * MOST_OF_ROBOT {
             if forms.len() >= MOST_OF_ROBOT {
                 break;
             }
-            let Some(form) = self.best(&picture, &forms, tests) else { break };
+            let Some(form) = self.best(&picture, &short, tests) else { break };
+            if forms.iter().filter(|own| own.target == form.target).count() >= MOST {
+                short.insert(form.target);
+                continue;
+            }
             picture = picture.with(std::slice::from_ref(&form.columns));
             forms.push(form);
             while let Some(weakest) = self.weakest(&picture, &forms) {
@@ -178,11 +203,11 @@ impl<'u, 'a> Ground<'u, 'a> {
                 if weakest == forms.len() {
                     // The last one added: there is no more to gain.
                     drop(dropped);
-                    return (picture, forms);
+                    return (picture, forms, short);
                 }
             }
         }
-        (picture, forms)
+        (picture, forms, short)
     }
 
     /// The form that is least needed beside the others, if it is not needed.

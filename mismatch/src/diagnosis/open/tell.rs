@@ -93,7 +93,7 @@ fn of_form(
     if p_familywise >= FAMILYWISE || ratio <= LEAST_GAIN {
         return no("not clear enough");
     }
-    if size <= ground.bound(form.target) {
+    if size <= ground.bound(form.target, &ground.harmless(form.target), &form.columns) {
         return no("too small to matter");
     }
     let own: Vec<&Unit<'_>> = held.iter().copied().filter(|unit| unit.robot == robot).collect();
@@ -110,7 +110,7 @@ fn of_form(
     let ci95 = [value - Z_95 * score.error, value + Z_95 * score.error];
     let estimate = Estimate { value, unit: units.clone(), ci95 };
     Ok(Finding {
-        verdict: Verdict::Form,
+        verdict: if kept.short.contains(&form.target) { Verdict::Unnameable } else { Verdict::Form },
         expression_units: Some(units),
         support_set,
         parameters: BTreeMap::from([("c".to_owned(), estimate)]),
@@ -187,6 +187,17 @@ fn mains(ground: &Ground<'_, '_>, target: Target) -> Vec<Option<(usize, usize)>>
     ground.units.iter().map(|unit| target.main(unit)).collect()
 }
 
+/// Adds a multiple of a column to another.
+fn add(sum: &mut Column, own: &Column, times: f64) {
+    for (sum, own) in sum.parts.iter_mut().zip(&own.parts) {
+        let Some(own) = own else { continue };
+        let sum = sum.get_or_insert_with(|| vec![0.0; own.len()]);
+        for (sum, own) in sum.iter_mut().zip(own) {
+            *sum += times * own;
+        }
+    }
+}
+
 /// The root mean square of the residuals of a target.
 fn spread(ground: &Ground<'_, '_>, target: Target, picture: &Picture<'_, '_>) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
@@ -208,12 +219,18 @@ fn spread(ground: &Ground<'_, '_>, target: Target, picture: &Picture<'_, '_>) ->
 pub(crate) fn curve_matters(
     ground: &Ground<'_, '_>,
     target: Target,
-    with: &Picture<'_, '_>,
+    (with, positions): (&Picture<'_, '_>, &[usize]),
     without: &Picture<'_, '_>,
 ) -> bool {
     let (share, error) = with.share_over(without, &mains(ground, target));
     let least = (share - NEAR_END * error).max(0.0).sqrt();
-    least * spread(ground, target, without) > ground.bound(target)
+    let mut whole: Vec<Column> = ground.units.iter().map(|unit| Column::empty(unit)).collect();
+    for (index, own) in whole.iter_mut().enumerate() {
+        for &position in positions {
+            add(own, &with.columns[index][position], with.moved[position]);
+        }
+    }
+    least * spread(ground, target, without) > ground.bound(target, &ground.harmless(target), &whole)
 }
 
 fn of_curve(
@@ -234,7 +251,7 @@ fn of_curve(
     };
     let without = picture.without(positions);
     let gain = picture.gain_over(&without);
-    if !curve_matters(ground, curve.target, picture, &without) {
+    if !curve_matters(ground, curve.target, (picture, positions), &without) {
         return no("too small to matter");
     }
     if gain.total <= GAIN_ERRORS * gain.standard_error {

@@ -13,6 +13,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use pleiad_mismatch::{DiagnoseOptions, TruthUse, diagnose};
+use pleiad_physics::Effect;
 use pleiad_recording::{Nominal, ReadOptions, Recording, read_model};
 use pleiad_report::{diagnose_report, write_summary};
 
@@ -26,6 +27,7 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
              ground truth that was not recorded is told as untestable"
         );
     }
+    let without = without(&args.without)?;
     let mut chosen = choice::choose(args)?;
     let model = args.model.as_deref().map(model).transpose()?;
     let spinner = output::spinner("reading");
@@ -37,7 +39,7 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
     // A folder that cannot be written to is told before the work, a new one is made after it.
     let asked = args.out.as_deref().map(|out| folder::create(Some(out), "")).transpose()?;
     spinner.set_message("diagnosing");
-    let options = DiagnoseOptions { fit_on: chosen.fit_on, test_on: chosen.test_on, truth: TruthUse::Auto };
+    let options = DiagnoseOptions { fit_on: chosen.fit_on, test_on: chosen.test_on, truth: TruthUse::Auto, without };
     let mut diagnosis = diagnose(&recordings, &options)?;
     diagnosis.findings.notes.extend(chosen.notes);
     sentences::fill_summaries(&mut diagnosis.findings);
@@ -52,6 +54,14 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
     diagnose_report(&report)?.write(&out.join("report.html"))?;
     spinner.finish_and_clear();
     output::print(args.json, &diagnosis.findings, &summary::text(&diagnosis.findings, &out))
+}
+
+fn without(names: &[String]) -> anyhow::Result<Vec<Effect>> {
+    let effect = |name: &String| {
+        Effect::from_name(name)
+            .with_context(|| format!("--without: no effect is called {name}; `pleiad effects` lists them"))
+    };
+    names.iter().map(effect).collect()
 }
 
 fn model(path: &Path) -> anyhow::Result<Nominal> {
