@@ -46,8 +46,11 @@ pub(crate) struct Judgement {
     pub(crate) support: Support,
     pub(crate) judged: Judged,
     pub(crate) gain: Gain,
+    /// What has no name and may be in its place.
+    pub(crate) unnamed_rivals: Vec<String>,
 }
 
+#[allow(clippy::too_many_lines, reason = "one pipeline from top to bottom")]
 pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Diagnosis, MismatchError> {
     if options.truth == TruthUse::No {
         return Err(MismatchError::WithoutTruth);
@@ -96,6 +99,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let recorded: Vec<String> = prepared.iter().map(|own| own.recording.name.clone()).collect();
     let opened = open(&units, &tests, &recorded, &fit, &spread, count);
     opened.displace(&mut judgements, &mut spread, &mut notes);
+    opened.doubt(&units, &mut judgements);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
@@ -253,7 +257,7 @@ fn judgements(
             on_tests(tests, &fit.terms[group[0]], &support)
         };
         let judged = judge(units, &support, gain, count);
-        all.push(Judgement { group: group.clone(), support, judged, gain });
+        all.push(Judgement { group: group.clone(), support, judged, gain, unnamed_rivals: Vec::new() });
     }
     all
 }
@@ -299,6 +303,7 @@ fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgem
     let mut support_set: Vec<String> =
         own.support.members.iter().map(|effect| effect.name().to_owned()).collect();
     support_set.dedup();
+    support_set.extend_from_slice(&own.unnamed_rivals);
     let verdict = own.judged.verdict.unwrap_or(Verdict::CannotTell);
     let manoeuvre = (verdict == Verdict::CannotTell).then(|| info.broken_by.to_owned());
     Finding {

@@ -28,7 +28,7 @@ use crate::diagnosis::open::target::Target;
 use crate::diagnosis::run::Judgement;
 use crate::diagnosis::spread::Spread;
 use crate::diagnosis::unit::Unit;
-use crate::findings::Finding;
+use crate::findings::{Finding, Verdict};
 use crate::parallel;
 use crate::view::{PartialResidual, Plots, ShapePlot};
 
@@ -119,6 +119,26 @@ pub(crate) fn open(
 }
 
 impl Opened {
+    /// Makes of names what cannot be told, where something unnameable shows in the same channel of the same robot
+    /// and gains a good part of what they gain: the effect may be a makeshift for it.
+    pub(crate) fn doubt(&self, units: &[&Unit<'_>], judgements: &mut [Judgement]) {
+        for own in judgements {
+            let robots: Vec<u32> = own.support.units.iter().map(|&unit| units[unit].robot.0).collect();
+            let doubts = |other: &&Unnamed| {
+                other.finding.verdict == Verdict::Unnameable
+                    && other.finding.channel == own.judged.channel.name()
+                    && robots.iter().all(|robot| other.finding.robots.contains(robot))
+                    && other.finding.held_out.log_score_gain > REST * own.gain.total
+            };
+            let doubted = self.found.iter().filter(doubts);
+            let rivals: Vec<String> = doubted.filter_map(|other| other.finding.expression.clone()).collect();
+            if own.judged.verdict == Some(Verdict::Named) && !rivals.is_empty() {
+                own.judged.verdict = Some(Verdict::CannotTell);
+                own.unnamed_rivals = rivals;
+            }
+        }
+    }
+
     /// Takes from terms of the fit what forms explain better; says so.
     pub(crate) fn displace(
         &self,
@@ -180,45 +200,70 @@ pub(crate) fn hypothesis<'u, 'a>(
     base: Picture<'u, 'a>,
     tests: usize,
 ) -> Hypothesis<'u, 'a> {
-    let (_, mut forms, mut short) = ground.forms(&base, tests);
-    let mut curves: Vec<Curve> = Vec::new();
-    let mut notes = Vec::new();
-    let mut closed: BTreeSet<Target> = BTreeSet::new();
-    let mut picture = built(&base, &curves, &forms);
-    while curves.len() < MOST_CURVES {
+    let (forms, short) = ground.forms(&base, tests);
+    let picture = built(&base, &[], &forms);
+    let mut own = Hypothesis { picture, base, forms, curves: Vec::new(), short, notes: Vec::new() };
+    for target in own.short.clone() {
+        own.bend(ground, target, tests);
+    }
+    let mut closed: BTreeSet<Target> = own.curves.iter().map(|curve| curve.target).collect();
+    let mut paired: BTreeSet<Target> = BTreeSet::new();
+    while own.curves.len() < MOST_CURVES {
         let open = ground.targets.iter().copied().filter(|target| !closed.contains(target));
-        let left = open.filter_map(|target| ground.curve(&picture, target, tests));
+        let left = open.filter_map(|target| ground.curve(&own.picture, target, tests));
         let Some(rest) = left.reduce(|a, b| if b.gain > a.gain { b } else { a }) else { break };
-        let exhausted = !short.contains(&rest.target);
         let target = rest.target;
-        closed.insert(target);
-        let others: Vec<Form> = forms.iter().filter(|own| own.target != target).cloned().collect();
-        let bare = built(&base, &curves, &others);
-        let own = forms.len() - others.len();
-        let by_forms = 2.0 * (picture.log_likelihood() - bare.log_likelihood()) / rest.inflation.max(1.0);
-        if own > 0 && exhausted && rest.gain < REST * by_forms {
-            notes.push(format!(
-                "robot {}: the form of the {} leaves a rest over {}: it is a description, not the whole",
-                ground.units[0].robot,
-                target.words().0,
-                rest.regressor.symbol().0
-            ));
-            continue;
+        let (others, bare) = own.without_forms_of(target);
+        if others.len() < own.forms.len() {
+            // What came first may be a makeshift for two forms of the same.
+            if paired.insert(target)
+                && let Some(pair) = ground.pair(&bare, &own.picture, &rest)
+            {
+                own.forms = others.into_iter().chain(pair).collect();
+                own.picture = built(&own.base, &own.curves, &own.forms);
+                continue;
+            }
+            let by_forms =
+                2.0 * (own.picture.log_likelihood() - bare.log_likelihood()) / rest.inflation.max(1.0);
+            if !own.short.contains(&target) && rest.gain < REST * by_forms {
+                closed.insert(target);
+                own.notes.push(format!(
+                    "robot {}: the form of the {} leaves a rest over {}: it is a description, not the whole",
+                    ground.units[0].robot,
+                    target.words().0,
+                    rest.regressor.symbol().0
+                ));
+                continue;
+            }
         }
-        let Some(curve) = (if own > 0 { ground.curve(&bare, target, tests) } else { Some(rest) }) else {
-            continue;
-        };
+        closed.insert(target);
+        own.bend(ground, target, tests);
+    }
+    own
+}
+
+impl<'u, 'a> Hypothesis<'u, 'a> {
+    /// The forms of other targets, and what is fitted without those of this one.
+    fn without_forms_of(&self, target: Target) -> (Vec<Form>, Picture<'u, 'a>) {
+        let others: Vec<Form> = self.forms.iter().filter(|own| own.target != target).cloned().collect();
+        let bare = built(&self.base, &self.curves, &others);
+        (others, bare)
+    }
+
+    /// Puts a curve in the place of the forms of a target, if there is one that matters.
+    fn bend(&mut self, ground: &Ground<'u, 'a>, target: Target, tests: usize) {
+        let (others, bare) = self.without_forms_of(target);
+        let Some(curve) = ground.curve(&bare, target, tests) else { return };
         let with = bare.with(&curve.all_columns());
         let positions: Vec<usize> = (bare.size()..with.size()).collect();
         if !tell::curve_matters(ground, target, (&with, &positions), &bare) {
-            continue;
+            return;
         }
-        curves.push(curve);
-        short.remove(&target);
-        forms = others;
-        picture = built(&base, &curves, &forms);
+        self.curves.push(curve);
+        self.short.remove(&target);
+        self.forms = others;
+        self.picture = built(&self.base, &self.curves, &self.forms);
     }
-    Hypothesis { picture, base, forms, curves, short, notes }
 }
 
 /// A base with curves and forms.

@@ -178,11 +178,7 @@ impl<'u, 'a> Ground<'u, 'a> {
 
     /// Adds forms as long as one is significant; drops those that no longer are. With the targets that would need
     /// more than they may have.
-    pub(crate) fn forms<'p>(
-        &self,
-        base: &Picture<'p, 'a>,
-        tests: usize,
-    ) -> (Picture<'p, 'a>, Vec<Form>, BTreeSet<Target>) {
+    pub(crate) fn forms<'p>(&self, base: &Picture<'p, 'a>, tests: usize) -> (Vec<Form>, BTreeSet<Target>) {
         let mut short = BTreeSet::new();
         let mut forms: Vec<Form> = Vec::new();
         let mut picture = base.clone();
@@ -197,28 +193,28 @@ impl<'u, 'a> Ground<'u, 'a> {
             }
             picture = picture.with(std::slice::from_ref(&form.columns));
             forms.push(form);
-            while let Some(weakest) = self.weakest(&picture, &forms) {
+            while let Some(weakest) = Self::weakest(&picture, &forms) {
                 picture = picture.without(&[picture.size() - forms.len() + weakest]);
                 let dropped = forms.remove(weakest);
                 if weakest == forms.len() {
                     // The last one added: there is no more to gain.
                     drop(dropped);
-                    return (picture, forms, short);
+                    return (forms, short);
                 }
             }
         }
-        (picture, forms, short)
+        (forms, short)
     }
 
     /// The form that is least needed beside the others, if it is not needed.
-    fn weakest(&self, picture: &Picture<'_, '_>, forms: &[Form]) -> Option<usize> {
-        let p = |position: usize| self.beside(picture, forms, position).map_or(1.0, |score| score.p);
+    fn weakest(picture: &Picture<'_, '_>, forms: &[Form]) -> Option<usize> {
+        let p = |position: usize| Self::beside(picture, forms, position).map_or(1.0, |score| score.p);
         let all = (0..forms.len()).map(|position| (p(position), position));
         all.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(p, _)| *p > PRUNE).map(|(_, position)| position)
     }
 
     /// What a form gains beside everything else.
-    pub(crate) fn beside(&self, picture: &Picture<'_, '_>, forms: &[Form], position: usize) -> Option<Score> {
+    pub(crate) fn beside(picture: &Picture<'_, '_>, forms: &[Form], position: usize) -> Option<Score> {
         let form = &forms[position];
         let without = picture.without(&[picture.size() - forms.len() + position]);
         // Noise is that of the whole: what the form explains is not noise.
@@ -227,6 +223,37 @@ impl<'u, 'a> Ground<'u, 'a> {
             own.noise = whole.noise.clone();
         }
         Bench::new(&without, form.target)?.score(&form.columns)
+    }
+
+    /// Two forms of what a rest depends on that together do better than the forms of its target in a picture.
+    pub(crate) fn pair(
+        &self,
+        bare: &Picture<'_, 'a>,
+        picture: &Picture<'_, 'a>,
+        rest: &Curve,
+    ) -> Option<Vec<Form>> {
+        let target = rest.target;
+        let of_rest = |own: &&Monomial| own.0.iter().all(|factor| factor.0 == rest.regressor);
+        let alone: Vec<(&Monomial, Vec<Column>)> = self.dictionaries[&target]
+            .iter()
+            .filter(of_rest)
+            .map(|own| (own, self.columns(target, &|at| own.value(at))))
+            .collect();
+        let mut best = (picture.log_likelihood() + 0.5 * LEAST_GAIN * rest.inflation.max(1.0), None);
+        for (second, b) in alone.iter().enumerate() {
+            for (first, a) in alone.iter().enumerate().take(second) {
+                let reached = bare.with(&[a.1.clone(), b.1.clone()]).log_likelihood();
+                if reached > best.0 {
+                    best = (reached, Some([first, second]));
+                }
+            }
+        }
+        let form = |position: usize| {
+            let (monomial, columns) = alone[position].clone();
+            let (monomial, equivalent) = (monomial.clone(), Vec::new());
+            Form { target, monomial, columns, equivalent, inflation: rest.inflation }
+        };
+        best.1.map(|pair| pair.map(form).to_vec())
     }
 
     /// The best curve of a target beside a picture.

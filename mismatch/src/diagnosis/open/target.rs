@@ -203,7 +203,9 @@ impl Target {
                 }
             }
             // A column is the derivative of measured minus predicted by a coefficient of the prediction.
-            part.iter_mut().for_each(|value| *value = -*value);
+            for value in &mut part {
+                *value = -*value;
+            }
             if part.iter().any(|value| *value != 0.0) {
                 column.parts[which] = Some(part);
             }

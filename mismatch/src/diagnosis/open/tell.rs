@@ -42,7 +42,7 @@ pub(crate) fn told(
         at += positions.len();
         match of_curve(ground, robot, kept, curve, &positions, tests) {
             Ok(finding) => {
-                all.found.push(shown_curve(ground, names, robot, kept, curve, &positions, finding))
+                all.found.push(shown_curve(ground, names, robot, kept, curve, &positions, finding));
             }
             Err(why) => all.notes.push(why),
         }
@@ -83,7 +83,7 @@ fn of_form(
     let no = |why: &str| {
         Err(format!("robot {robot}: {text} (c = {value:.3e} {units}) is there, but {why}; it is no finding"))
     };
-    let Some(score) = ground.beside(picture, &kept.forms, index) else {
+    let Some(score) = Ground::beside(picture, &kept.forms, index) else {
         return no("cannot be told from the rest");
     };
     let without = picture.without(&[position]);
@@ -295,7 +295,7 @@ fn acts(ground: &Ground<'_, '_>, curve: &Curve, values: &[f64]) -> Place {
     let most = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let large = || knots.iter().zip(values).filter(|(_, value)| value.abs() >= ACTS * most);
     let from = large().next().map_or(knots[0], |(knot, _)| *knot);
-    let to = large().last().map_or(knots[knots.len() - 1], |(knot, _)| *knot);
+    let to = large().next_back().map_or(knots[knots.len() - 1], |(knot, _)| *knot);
     let extent = |base: Base| {
         let each = ground.units.iter().zip(&ground.motions);
         let all = each.flat_map(|(unit, motions)| curve.target.instants(unit, motions));
