@@ -256,7 +256,7 @@ impl<'u, 'a> Hypothesis<'u, 'a> {
         let Some(curve) = ground.curve(&bare, target, tests) else { return };
         let with = bare.with(&curve.all_columns());
         let positions: Vec<usize> = (bare.size()..with.size()).collect();
-        if !tell::curve_matters(ground, target, (&with, &positions), &bare) {
+        if !tell::curve_matters(ground, &curve, (&with, &positions), &bare) {
             return;
         }
         self.curves.push(curve);

@@ -14,6 +14,35 @@ const ROUNDS: usize = 4;
 /// So much of the diagonal keeps parameters that say the same apart.
 const DAMPING: f64 = 1e-9;
 
+/// How data are left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Folds {
+    /// Spans of the recording, with an embargo on both sides.
+    Spans,
+    /// Blocks of time by turns, for what depends on the time itself: a span that is left out says nothing of it.
+    Turns,
+}
+
+impl Folds {
+    fn holds(self, unit: &Unit<'_>, number: usize, index: usize) -> bool {
+        match self {
+            Self::Spans => fold(unit, number).contains(&unit.rows[index].time_s),
+            Self::Turns => unit.block_of[index] % FOLDS == number,
+        }
+    }
+
+    fn trains(self, unit: &Unit<'_>, number: usize, index: usize) -> bool {
+        match self {
+            Self::Spans => {
+                let fold = fold(unit, number);
+                let time_s = unit.rows[index].time_s;
+                time_s < fold.start - EMBARGO_S || time_s >= fold.end + EMBARGO_S
+            }
+            Self::Turns => !self.holds(unit, number, index),
+        }
+    }
+}
+
 #[derive(Clone)]
 pub(crate) struct Picture<'u, 'a> {
     pub(crate) units: Vec<&'u Unit<'a>>,
@@ -114,12 +143,8 @@ impl<'u, 'a> Picture<'u, 'a> {
     }
 
     /// The states as they are if a fold is not fitted.
-    fn left_out(&self, number: usize) -> Vec<State> {
-        let training = |unit: &Unit<'_>, index: usize| {
-            let fold = fold(unit, number);
-            let time_s = unit.rows[index].time_s;
-            time_s < fold.start - EMBARGO_S || time_s >= fold.end + EMBARGO_S
-        };
+    fn left_out(&self, number: usize, folds: Folds) -> Vec<State> {
+        let training = |unit: &Unit<'_>, index: usize| folds.trains(unit, number, index);
         let mut states = self.states.clone();
         for (unit, state) in self.units.iter().zip(&mut states) {
             for index in (0..unit.rows.len()).filter(|&index| !training(unit, index)) {
@@ -142,15 +167,14 @@ impl<'u, 'a> Picture<'u, 'a> {
     }
 
     /// The gain over another on folds that neither saw.
-    pub(crate) fn gain_over(&self, other: &Self) -> Gain {
+    pub(crate) fn gain_over(&self, other: &Self, folds: Folds) -> Gain {
         let mut blocks: Vec<Vec<f64>> = self.units.iter().map(|unit| vec![0.0; unit.blocks]).collect();
         for number in 0..FOLDS {
-            let (with, without) = (self.left_out(number), other.left_out(number));
+            let (with, without) = (self.left_out(number, folds), other.left_out(number, folds));
             for (((unit, blocks), with), without) in
                 self.units.iter().zip(&mut blocks).zip(&with).zip(&without)
             {
-                let fold = fold(unit, number);
-                for index in (0..unit.rows.len()).filter(|&index| fold.contains(&unit.rows[index].time_s)) {
+                for index in (0..unit.rows.len()).filter(|&index| folds.holds(unit, number, index)) {
                     blocks[unit.block_of[index]] += gain(with, without, index);
                 }
             }
@@ -160,19 +184,24 @@ impl<'u, 'a> Picture<'u, 'a> {
 
     /// The share of the squares of one component that this explains beyond another, on folds that neither saw,
     /// with its standard error.
-    pub(crate) fn share_over(&self, other: &Self, main: &[Option<(usize, usize)>]) -> (f64, f64) {
+    pub(crate) fn share_over(
+        &self,
+        other: &Self,
+        main: &[Option<(usize, usize)>],
+        folds: Folds,
+    ) -> (f64, f64) {
         // What is left, and what is less: by block.
         let mut blocks: Vec<[f64; 2]> = Vec::new();
         let offsets: Vec<usize> =
             self.units.iter().scan(0, |sum, unit| Some(std::mem::replace(sum, *sum + unit.blocks))).collect();
         blocks.resize(self.units.iter().map(|unit| unit.blocks).sum(), [0.0; 2]);
         for number in 0..FOLDS {
-            let (with, without) = (self.left_out(number), other.left_out(number));
+            let (with, without) = (self.left_out(number, folds), other.left_out(number, folds));
             for (index, unit) in self.units.iter().enumerate() {
                 let Some((which, component)) = main[index] else { continue };
-                let (fold, stretch) = (fold(unit, number), &unit.stretches[which]);
+                let stretch = &unit.stretches[which];
                 for row in stretch.range().skip(component).step_by(stretch.components) {
-                    if !fold.contains(&unit.rows[row].time_s) {
+                    if !folds.holds(unit, number, row) {
                         continue;
                     }
                     let sigma = with[index].noise.sigma[row];

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::diagnosis::open::bench::{Bench, Score};
 use crate::diagnosis::open::monomial::{Base, Monomial, of_motion, of_reading, of_sighting};
 use crate::diagnosis::open::motion::Motions;
-use crate::diagnosis::open::picture::Picture;
+use crate::diagnosis::open::picture::{Folds, Picture};
 use crate::diagnosis::open::spline::Basis;
 use crate::diagnosis::open::target::Target;
 use crate::diagnosis::select::{FAMILYWISE, LEAST_GAIN};
@@ -300,6 +300,11 @@ impl<'u, 'a> Ground<'u, 'a> {
 }
 
 impl Curve {
+    /// How data are left out to see whether it holds there.
+    pub(crate) fn folds(&self) -> Folds {
+        if self.regressor == Base::Time { Folds::Turns } else { Folds::Spans }
+    }
+
     pub(crate) fn all_columns(&self) -> Vec<Vec<Column>> {
         self.columns.iter().map(|(_, columns)| columns.clone()).collect()
     }

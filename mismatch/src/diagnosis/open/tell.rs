@@ -9,7 +9,7 @@ use crate::diagnosis::fit::states;
 use crate::diagnosis::held_out::{Gain, compared};
 use crate::diagnosis::naming::{GAIN_ERRORS, NEAR_END, Z_95};
 use crate::diagnosis::open::monomial::{Base, unit};
-use crate::diagnosis::open::picture::{Picture, shift};
+use crate::diagnosis::open::picture::{Folds, Picture, shift};
 use crate::diagnosis::open::search::{Curve, Form, Ground};
 use crate::diagnosis::open::target::Target;
 use crate::diagnosis::open::{Hypothesis, Opened, Unnamed};
@@ -98,7 +98,7 @@ fn of_form(
     }
     let own: Vec<&Unit<'_>> = held.iter().copied().filter(|unit| unit.robot == robot).collect();
     let gain = if own.is_empty() {
-        picture.gain_over(&without)
+        picture.gain_over(&without, Folds::Spans)
     } else {
         on_held(ground, &own, kept, index).unwrap_or_default()
     };
@@ -218,11 +218,12 @@ fn spread(ground: &Ground<'_, '_>, target: Target, picture: &Picture<'_, '_>) ->
 /// Whether what a curve explains is certainly more than what is harmless.
 pub(crate) fn curve_matters(
     ground: &Ground<'_, '_>,
-    target: Target,
+    curve: &Curve,
     (with, positions): (&Picture<'_, '_>, &[usize]),
     without: &Picture<'_, '_>,
 ) -> bool {
-    let (share, error) = with.share_over(without, &mains(ground, target));
+    let target = curve.target;
+    let (share, error) = with.share_over(without, &mains(ground, target), curve.folds());
     let least = (share - NEAR_END * error).max(0.0).sqrt();
     let mut whole: Vec<Column> = ground.units.iter().map(|unit| Column::empty(unit)).collect();
     for (index, own) in whole.iter_mut().enumerate() {
@@ -250,14 +251,14 @@ fn of_curve(
         ))
     };
     let without = picture.without(positions);
-    let gain = picture.gain_over(&without);
-    if !curve_matters(ground, curve.target, (picture, positions), &without) {
+    let gain = picture.gain_over(&without, curve.folds());
+    if !curve_matters(ground, curve, (picture, positions), &without) {
         return no("too small to matter");
     }
     if gain.total <= GAIN_ERRORS * gain.standard_error {
         return no("of no use on data left out");
     }
-    let (share, error) = picture.share_over(&without, &mains(ground, curve.target));
+    let (share, error) = picture.share_over(&without, &mains(ground, curve.target), curve.folds());
     let mut values = vec![0.0; curve.basis.knots.len()];
     let mut errors = vec![0.0; curve.basis.knots.len()];
     let bench = crate::diagnosis::open::bench::Bench::new(&without, curve.target);
