@@ -5,9 +5,9 @@ use std::io::{self, Write as _};
 use std::time::Instant;
 
 use pleiad_mismatch::{DiagnoseOptions, diagnose};
+use pleiad_sim_peers::simulate;
 use pleiad_tests::clean::{HUNDRED, told};
 use pleiad_tests::known_effects::cases_named;
-use pleiad_sim_peers::simulate;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -34,17 +34,28 @@ fn main() {
             let options = DiagnoseOptions { without, ..DiagnoseOptions::default() };
             let Ok(found) = diagnose(&[run.recording], &options) else { continue };
             let mut out = io::stdout();
-            let _ = writeln!(out, "## {name} {values:?} seed {seed}: {:?} in {:.1} s", found.findings.verdict, begun.elapsed().as_secs_f64());
+            let _ = writeln!(
+                out,
+                "## {name} {values:?} seed {seed}: {:?} in {:.1} s",
+                found.findings.verdict,
+                begun.elapsed().as_secs_f64()
+            );
             for own in &found.findings.findings {
                 let _ = writeln!(out, "  - {} {:?}", told(own), own.expression);
                 for (label, value) in &own.parameters {
-                    let _ = writeln!(out, "      {label} = {:.5} [{:.5}, {:.5}] {}", value.value, value.ci95[0], value.ci95[1], value.unit);
+                    let _ = writeln!(
+                        out,
+                        "      {label} = {:.5} [{:.5}, {:.5}] {}",
+                        value.value, value.ci95[0], value.ci95[1], value.unit
+                    );
                 }
                 if let Some(shape) = &own.shape {
                     let _ = writeln!(out, "      {:?}", shape);
                 }
             }
-            for note in found.findings.notes.iter().filter(|note| note.contains("finding") || note.contains("rest")) {
+            for note in
+                found.findings.notes.iter().filter(|note| note.contains("finding") || note.contains("rest"))
+            {
                 let _ = writeln!(out, "  note {note}");
             }
         }

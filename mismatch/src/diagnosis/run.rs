@@ -133,6 +133,9 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let named_count = findings.len();
     findings.extend(opened.found.iter().map(|own| own.finding.clone()));
     notes.extend(opened.notes.iter().cloned());
+    if !opened.found.is_empty() {
+        notes.push("what has no name is not in the corrected model".to_owned());
+    }
     let mut undetected = undetected(&units, &scored, count);
     undetected.extend_from_slice(&spread.undetected);
     entries.untestable.extend_from_slice(&spread.untestable);

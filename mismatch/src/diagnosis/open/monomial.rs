@@ -29,10 +29,41 @@ pub(crate) enum Base {
 }
 
 /// How many bases there are.
-pub(crate) const BASES: usize = 12;
+const BASES: usize = 12;
+/// Those whose cosine and sine are kept: many monomials ask for them.
+const ANGLES: [Base; 3] = [Base::Heading, Base::LeftWheel, Base::RightWheel];
 
 /// The value of every base; NaN where it is not known.
-pub(crate) type Instant = [f64; BASES];
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Instant {
+    values: [f64; BASES],
+    circles: [[f64; 2]; ANGLES.len()],
+}
+
+impl Instant {
+    /// Nothing is known but these.
+    pub(crate) fn of(known: &[(Base, f64)]) -> Self {
+        let mut values = [f64::NAN; BASES];
+        for &(base, value) in known {
+            values[base as usize] = value;
+        }
+        let circle = |base: Base| {
+            let angle = values[base as usize];
+            [libm::cos(angle), libm::sin(angle)]
+        };
+        Self { values, circles: ANGLES.map(circle) }
+    }
+
+    pub(crate) fn get(&self, base: Base) -> f64 {
+        self.values[base as usize]
+    }
+
+    /// Cosine and sine of an angle.
+    fn circle(&self, base: Base) -> [f64; 2] {
+        let kept = ANGLES.iter().position(|own| *own == base).map(|position| self.circles[position]);
+        kept.unwrap_or_else(|| [libm::cos(self.get(base)), libm::sin(self.get(base))])
+    }
+}
 
 impl Base {
     /// Its symbol, and the powers of metre, second and radian in its unit.
@@ -106,7 +137,7 @@ impl Factor {
     }
 
     fn value(self, at: &Instant) -> f64 {
-        let z = at[self.0 as usize];
+        let z = at.get(self.0);
         match self.1 {
             Form::Plain => z,
             Form::Abs => z.abs(),
@@ -116,10 +147,16 @@ impl Factor {
             Form::SignedSquare => z * z.abs(),
             Form::Cube => z * z * z,
             Form::AbsCube => (z * z * z).abs(),
-            Form::Cos => libm::cos(z),
-            Form::Sin => libm::sin(z),
-            Form::CosTwice => libm::cos(2.0 * z),
-            Form::SinTwice => libm::sin(2.0 * z),
+            Form::Cos => at.circle(self.0)[0],
+            Form::Sin => at.circle(self.0)[1],
+            Form::CosTwice => {
+                let [cos, sin] = at.circle(self.0);
+                cos * cos - sin * sin
+            }
+            Form::SinTwice => {
+                let [cos, sin] = at.circle(self.0);
+                2.0 * cos * sin
+            }
             Form::Inverse => 1.0 / z.max(0.1),
         }
     }
@@ -345,12 +382,13 @@ mod tests {
 
     #[test]
     fn what_is_not_known_adds_nothing_and_noise_has_no_sign() {
-        let mut at = [f64::NAN; BASES];
-        at[Base::Speed as usize] = 0.004;
+        let at = Instant::of(&[(Base::Speed, 0.004)]);
         let motion = of_motion(false);
         assert!(named("sign(v)", &motion).value(&at).abs() < 1e-12);
         assert!(named("cos(heading)", &motion).value(&at).abs() < 1e-12);
-        at[Base::Speed as usize] = -0.5;
+        let at = Instant::of(&[(Base::Speed, -0.5), (Base::Heading, 0.3)]);
+        assert!((named("cos(2 heading)", &motion).value(&at) - 0.6_f64.cos()).abs() < 1e-12);
+        assert!((named("sin(2 heading)", &motion).value(&at) - 0.6_f64.sin()).abs() < 1e-12);
         assert!((named("v |v|", &motion).value(&at) + 0.25).abs() < 1e-12);
     }
 }

@@ -6,7 +6,7 @@ use pleiad_physics::{Context, Motion, Pose};
 
 use crate::channel::Channel;
 use crate::commanded;
-use crate::diagnosis::open::monomial::{BASES, Base, Instant};
+use crate::diagnosis::open::monomial::{Base, Instant};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::{Row, Stretch, Unit};
 use crate::schedule::Schedule;
@@ -34,8 +34,8 @@ pub(crate) struct Span {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rolled {
     pub(crate) samples: Vec<Instant>,
-    /// By how much the heading differs from that in the middle of the window, of each sample, radians.
-    pub(crate) turned_rad: Vec<f64>,
+    /// Cosine and sine of how much the heading differs from that in the middle of the window, of each sample.
+    pub(crate) turned: Vec<[f64; 2]>,
     pub(crate) rows: Vec<Span>,
 }
 
@@ -49,16 +49,16 @@ impl Rolled {
             let step_s = (to_s - from_s) / count as f64;
             let first = all.samples.len();
             let mut turned = 0.0;
+            let mut angles = Vec::with_capacity(count);
             for index in 0..count {
                 let at = instant(track, from_s + (index as f64 + 0.5) * step_s);
-                let rate = known(at[Base::YawRate as usize]);
+                let rate = known(at.get(Base::YawRate));
                 all.samples.push(at);
-                all.turned_rad.push(turned + 0.5 * rate * step_s);
+                angles.push(turned + 0.5 * rate * step_s);
                 turned += rate * step_s;
             }
-            for own in &mut all.turned_rad[first..] {
-                *own -= 0.5 * turned;
-            }
+            let circle = |angle: f64| [libm::cos(angle - 0.5 * turned), libm::sin(angle - 0.5 * turned)];
+            all.turned.extend(angles.into_iter().map(circle));
             all.rows.push(Span { first, count, step_s });
         }
         all
@@ -136,26 +136,26 @@ impl Motions {
 
 /// What was driven at an instant, by the odometry and the truth.
 fn instant(track: &Track, time_s: f64) -> Instant {
-    let mut at = [f64::NAN; BASES];
-    at[Base::Time as usize] = time_s;
+    let mut at: Vec<(Base, f64)> = Vec::with_capacity(12);
+    at.push((Base::Time, time_s));
     if let Some(regime) = track.regime_at(time_s) {
-        at[Base::Speed as usize] = regime.speed_m_s;
-        at[Base::YawRate as usize] = regime.yaw_rate_rad_s;
-        at[Base::Acceleration as usize] = regime.acceleration_m_s2;
+        at.push((Base::Speed, regime.speed_m_s));
+        at.push((Base::YawRate, regime.yaw_rate_rad_s));
+        at.push((Base::Acceleration, regime.acceleration_m_s2));
         if let Some(pose) = regime.pose {
-            at[Base::Heading as usize] = pose.yaw_rad;
-            at[Base::X as usize] = pose.x_m;
-            at[Base::Y as usize] = pose.y_m;
+            at.push((Base::Heading, pose.yaw_rad));
+            at.push((Base::X, pose.x_m));
+            at.push((Base::Y, pose.y_m));
         }
     }
     let rate = |time_s: f64| track.regime_at(time_s).map(|regime| regime.yaw_rate_rad_s);
     let change = rate(time_s - REACH_S).zip(rate(time_s + REACH_S)).map_or(0.0, |(a, b)| b - a);
-    at[Base::YawAcceleration as usize] = change / (2.0 * REACH_S);
+    at.push((Base::YawAcceleration, change / (2.0 * REACH_S)));
     if let Some(wheels) = track.wheels_at(time_s) {
-        at[Base::LeftWheel as usize] = wheels.angle_rad[0];
-        at[Base::RightWheel as usize] = wheels.angle_rad[1];
+        at.push((Base::LeftWheel, wheels.angle_rad[0]));
+        at.push((Base::RightWheel, wheels.angle_rad[1]));
     }
-    at
+    Instant::of(&at)
 }
 
 /// Set-points when they act, how far the servo is behind them, and where the robot is.
@@ -182,21 +182,21 @@ fn driven(unit: &Unit<'_>, track: &Track, terms: &[Term], ends_s: Vec<(f64, f64)
             asked = [command.command.speed_m_s, command.command.yaw_rate_rad_s];
             next += 1;
         }
-        let mut at = [f64::NAN; BASES];
-        at[Base::Time as usize] = middle_s;
-        at[Base::Speed as usize] = asked[0];
-        at[Base::YawRate as usize] = asked[1];
-        at[Base::Acceleration as usize] = (asked[0] - reached[0]) / time_constants_s[0];
-        at[Base::YawAcceleration as usize] = (asked[1] - reached[1]) / time_constants_s[1];
+        let mut at: Vec<(Base, f64)> = Vec::with_capacity(12);
+        at.push((Base::Time, middle_s));
+        at.push((Base::Speed, asked[0]));
+        at.push((Base::YawRate, asked[1]));
+        at.push((Base::Acceleration, (asked[0] - reached[0]) / time_constants_s[0]));
+        at.push((Base::YawAcceleration, (asked[1] - reached[1]) / time_constants_s[1]));
         if let Some(pose) = track.truth_at(middle_s) {
-            at[Base::Heading as usize] = pose.yaw_rad;
-            at[Base::X as usize] = pose.x_m;
-            at[Base::Y as usize] = pose.y_m;
+            at.push((Base::Heading, pose.yaw_rad));
+            at.push((Base::X, pose.x_m));
+            at.push((Base::Y, pose.y_m));
         }
         for axis in 0..2 {
             reached[axis] = asked[axis] + (reached[axis] - asked[axis]) * keep[axis];
         }
-        samples.push(at);
+        samples.push(Instant::of(&at));
     }
     Driven { from_s, samples, ends_s, time_constants_s }
 }
@@ -205,23 +205,23 @@ fn driven(unit: &Unit<'_>, track: &Track, terms: &[Term], ends_s: Vec<(f64, f64)
 fn readings(unit: &Unit<'_>, stretch: &Stretch) -> Vec<Instant> {
     let row = |index: usize| {
         let row = &unit.rows[index];
-        let mut at = [f64::NAN; BASES];
-        at[Base::Time as usize] = row.time_s;
-        at[Base::Speed as usize] = row.regime.speed_m_s;
-        at[Base::YawRate as usize] = row.regime.yaw_rate_rad_s;
-        at[Base::Acceleration as usize] = row.regime.acceleration_m_s2;
-        let Some(pose) = row.regime.pose else { return at };
-        at[Base::Heading as usize] = pose.yaw_rad;
-        at[Base::X as usize] = pose.x_m;
-        at[Base::Y as usize] = pose.y_m;
+        let mut at: Vec<(Base, f64)> = Vec::with_capacity(12);
+        at.push((Base::Time, row.time_s));
+        at.push((Base::Speed, row.regime.speed_m_s));
+        at.push((Base::YawRate, row.regime.yaw_rate_rad_s));
+        at.push((Base::Acceleration, row.regime.acceleration_m_s2));
+        let Some(pose) = row.regime.pose else { return Instant::of(&at) };
+        at.push((Base::Heading, pose.yaw_rad));
+        at.push((Base::X, pose.x_m));
+        at.push((Base::Y, pose.y_m));
         let seen = row.target.and_then(|target| sightings::seen(unit.evidence, target, row.time_s).ok());
         if let Some(seen) = seen {
             let [forward, left] =
                 pose.rotate_back([seen.position_m[0] - pose.x_m, seen.position_m[1] - pose.y_m]);
-            at[Base::Range as usize] = libm::hypot(forward, left);
-            at[Base::Bearing as usize] = libm::atan2(left, forward);
+            at.push((Base::Range, libm::hypot(forward, left)));
+            at.push((Base::Bearing, libm::atan2(left, forward)));
         }
-        at
+        Instant::of(&at)
     };
     stretch.range().step_by(stretch.components).map(row).collect()
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnosis::open::bench::{Bench, Score};
-use crate::diagnosis::open::monomial::{Base, Monomial, of_motion, of_reading, of_sighting};
+use crate::diagnosis::open::monomial::{Base, Instant, Monomial, of_motion, of_reading, of_sighting};
 use crate::diagnosis::open::motion::Motions;
 use crate::diagnosis::open::picture::{Folds, Picture};
 use crate::diagnosis::open::spline::Basis;
@@ -89,11 +89,7 @@ impl<'u, 'a> Ground<'u, 'a> {
         2.0 * (alike.max(1) as f64).ln()
     }
 
-    pub(crate) fn columns(
-        &self,
-        target: Target,
-        function: &(dyn Fn(&[f64; 12]) -> f64 + Sync),
-    ) -> Vec<Column> {
+    pub(crate) fn columns(&self, target: Target, function: &(dyn Fn(&Instant) -> f64 + Sync)) -> Vec<Column> {
         let own = |(unit, motions): (&&Unit<'_>, &Motions)| target.column(unit, motions, function);
         self.units.iter().zip(&self.motions).map(own).collect()
     }
@@ -259,7 +255,7 @@ impl<'u, 'a> Ground<'u, 'a> {
     /// The best curve of a target beside a picture.
     pub(crate) fn curve(&self, picture: &Picture<'_, '_>, target: Target, tests: usize) -> Option<Curve> {
         let bench = Bench::new(picture, target)?;
-        let instants: Vec<Vec<[f64; 12]>> = self
+        let instants: Vec<Vec<Instant>> = self
             .units
             .iter()
             .zip(&self.motions)
@@ -268,10 +264,10 @@ impl<'u, 'a> Ground<'u, 'a> {
         let rows: usize = instants.iter().map(Vec::len).sum();
         let mut best: Option<(f64, Curve)> = None;
         for &regressor in target.regressors() {
-            let values: Vec<f64> = instants.iter().flatten().map(|at| at[regressor as usize]).collect();
+            let values: Vec<f64> = instants.iter().flatten().map(|at| at.get(regressor)).collect();
             let Some(basis) = Basis::new(&values) else { continue };
             let all: Vec<(usize, Vec<Column>)> = (0..basis.knots.len())
-                .map(|knot| (knot, self.columns(target, &|at| basis.value(knot, at[regressor as usize]))))
+                .map(|knot| (knot, self.columns(target, &|at| basis.value(knot, at.get(regressor)))))
                 .collect();
             // Beside a constant that is fitted the height of the curve says nothing: it is zero in the middle.
             let middle = basis.knots.len() / 2;

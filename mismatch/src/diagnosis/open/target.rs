@@ -230,13 +230,13 @@ impl Target {
             for sample in first..first + count {
                 let at = &body.samples[sample];
                 let added = function(at) * step_s;
-                let (sin, cos) = (libm::sin(body.turned_rad[sample]), libm::cos(body.turned_rad[sample]));
+                let [cos, sin] = body.turned[sample];
                 let along = match self {
                     Self::Forward => [added, 0.0],
                     Self::Left => [0.0, added],
                     _ => {
                         off_rad += added;
-                        let speed = at[Base::Speed as usize];
+                        let speed = at.get(Base::Speed);
                         let driven = if speed.is_finite() { speed * step_s } else { 0.0 };
                         [0.0, driven * (off_rad - 0.5 * added)]
                     }

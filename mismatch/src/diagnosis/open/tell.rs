@@ -8,7 +8,7 @@ use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::fit::states;
 use crate::diagnosis::held_out::{Gain, compared};
 use crate::diagnosis::naming::{GAIN_ERRORS, NEAR_END, Z_95};
-use crate::diagnosis::open::monomial::{Base, unit};
+use crate::diagnosis::open::monomial::{Base, Instant, unit};
 use crate::diagnosis::open::picture::{Folds, Picture, shift};
 use crate::diagnosis::open::search::{Curve, Form, Ground};
 use crate::diagnosis::open::target::Target;
@@ -300,7 +300,7 @@ fn acts(ground: &Ground<'_, '_>, curve: &Curve, values: &[f64]) -> Place {
     let extent = |base: Base| {
         let each = ground.units.iter().zip(&ground.motions);
         let all = each.flat_map(|(unit, motions)| curve.target.instants(unit, motions));
-        let known = all.map(|at| at[base as usize]).filter(|value| value.is_finite());
+        let known = all.map(|at| at.get(base)).filter(|value| value.is_finite());
         known.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| {
             [least.min(value), most.max(value)]
         })
@@ -373,9 +373,7 @@ fn shown_form(
     bases.dedup();
     let shapes = match bases[..] {
         [base] => drawn(ground, form.target, base, &partial, &|x| {
-            let mut at = [0.0; 12];
-            at[base as usize] = x;
-            value * form.monomial.value(&at)
+            value * form.monomial.value(&Instant::of(&[(base, x)]))
         }),
         _ => Vec::new(),
     };
@@ -412,7 +410,7 @@ fn drawn(
     let mut all = Vec::new();
     let recorded = ground.units.iter().zip(&ground.motions).filter(|(unit, _)| target.is_recorded(unit));
     for ((unit_of, motions), own) in recorded.zip(partial) {
-        let x: Vec<f64> = target.instants(unit_of, motions).iter().map(|at| at[base as usize]).collect();
+        let x: Vec<f64> = target.instants(unit_of, motions).iter().map(|at| at.get(base)).collect();
         let known = || x.iter().copied().filter(|x| x.is_finite());
         let (least, greatest) =
             (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));

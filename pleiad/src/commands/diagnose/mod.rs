@@ -39,7 +39,8 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
     // A folder that cannot be written to is told before the work, a new one is made after it.
     let asked = args.out.as_deref().map(|out| folder::create(Some(out), "")).transpose()?;
     spinner.set_message("diagnosing");
-    let options = DiagnoseOptions { fit_on: chosen.fit_on, test_on: chosen.test_on, truth: TruthUse::Auto, without };
+    let options =
+        DiagnoseOptions { fit_on: chosen.fit_on, test_on: chosen.test_on, truth: TruthUse::Auto, without };
     let mut diagnosis = diagnose(&recordings, &options)?;
     diagnosis.findings.notes.extend(chosen.notes);
     sentences::fill_summaries(&mut diagnosis.findings);

@@ -9,8 +9,7 @@ use pleiad_physics::Effect;
 use pleiad_recording::Recording;
 use pleiad_report::{
     Claim, DiagnoseReport, DiagnosedRecording, Evidence, Found, HorizonError, Landmark, NotTested,
-    ParameterEstimate, ResidualColumns, RobotRollOut, ShapeColumns,
-    SmallestDetectable, StageTest,
+    ParameterEstimate, ResidualColumns, RobotRollOut, ShapeColumns, SmallestDetectable, StageTest,
 };
 
 use super::corrected::seconds;

@@ -185,7 +185,9 @@ pub(super) fn rivals(finding: &Found) -> String {
         } else {
             format!("On these data the same: {}", joined(&finding.rivals, "or"))
         };
-        return format!("No effect of the catalogue explains it; a form is a description and no cause. {others}.");
+        return format!(
+            "No effect of the catalogue explains it; a form is a description and no cause. {others}."
+        );
     }
     if finding.claim == Claim::Unnameable {
         return "Every effect of the catalogue was tried and falls short; the shape below is a description."
