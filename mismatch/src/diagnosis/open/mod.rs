@@ -156,7 +156,10 @@ impl Opened {
         for own in &mut spread.terms {
             let shows = |(robot, target): &(RobotId, Target)| {
                 own.robots.contains(robot)
-                    && target.channels().iter().any(|(channel, _)| *channel == own.judged.channel)
+                    && target
+                        .channels()
+                        .iter()
+                        .any(|(channel, _)| are_judged_together(*channel, own.judged.channel))
             };
             if own.judged.verdict.is_some() && self.unexplained.iter().any(shows) {
                 own.judged.verdict = None;
@@ -176,6 +179,12 @@ impl Opened {
             plots.shapes.extend(own.shapes.iter().map(|one| ShapePlot { finding, ..one.clone() }));
         }
     }
+}
+
+/// Whether a likelihood of spread has both channels: of sightings it has all.
+fn are_judged_together(a: Channel, b: Channel) -> bool {
+    let seen = |channel: Channel| Channel::SIGHTINGS.as_flattened().contains(&channel);
+    a == b || (seen(a) && seen(b))
 }
 
 /// Targets in channels that a finding of spread moves about.

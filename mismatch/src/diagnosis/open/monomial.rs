@@ -190,6 +190,12 @@ impl Monomial {
         self.0.iter().map(|factor| factor.degree()).sum()
     }
 
+    /// Whether a cosine or a sine is in it.
+    pub(crate) fn has_circle(&self) -> bool {
+        let circle = |form| matches!(form, Form::Cos | Form::Sin | Form::CosTwice | Form::SinTwice);
+        self.0.iter().any(|factor| circle(factor.1))
+    }
+
     /// Its value; 0 where a base is not known.
     pub(crate) fn value(&self, at: &Instant) -> f64 {
         let value: f64 = self.0.iter().map(|factor| factor.value(at)).product();

@@ -238,7 +238,10 @@ impl<'u, 'a> Ground<'u, 'a> {
         let mut best = (picture.log_likelihood() + 0.5 * LEAST_GAIN * rest.inflation.max(1.0), None);
         for (second, b) in alone.iter().enumerate() {
             for (first, a) in alone.iter().enumerate().take(second) {
-                let reached = bare.with(&[a.1.clone(), b.1.clone()]).log_likelihood();
+                // Of pairs that do as well, powers rather than circles: `b` and `b^3`, not `b` and `sin(b)`.
+                let circles = [a.0, b.0].iter().filter(|own| own.has_circle()).count();
+                let reached = bare.with(&[a.1.clone(), b.1.clone()]).log_likelihood()
+                    - 0.5 * ODDS * rest.inflation.max(1.0) * circles as f64;
                 if reached > best.0 {
                     best = (reached, Some([first, second]));
                 }

@@ -95,7 +95,9 @@ pub(crate) fn shape_figure(shape: &ShapeColumns) -> Option<Figure> {
         .filter(|point| point.iter().all(|value| value.is_finite()))
         .collect();
     let (scale, unit) = readable(points.iter().map(|point| &point[1]), &shape.unit);
-    points.iter_mut().for_each(|point| point[1] *= scale);
+    for point in &mut points {
+        point[1] *= scale;
+    }
     let least = points.iter().map(|point| point[0]).fold(f64::INFINITY, f64::min);
     let greatest = points.iter().map(|point| point[0]).fold(f64::NEG_INFINITY, f64::max);
     if least >= greatest || points.is_empty() {
