@@ -50,7 +50,7 @@ fn main() {
                     );
                 }
                 if let Some(shape) = &own.shape {
-                    let _ = writeln!(out, "      {:?}", shape);
+                    let _ = writeln!(out, "      {shape:?}");
                 }
             }
             for note in
