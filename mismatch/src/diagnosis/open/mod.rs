@@ -3,9 +3,10 @@
 //!
 //! [`monomial`] is the dictionary, [`target`] and [`motion`] make columns of it, [`bench`] scores them beside what
 //! is fitted ([`picture`]), [`search`] adds forms and curves ([`spline`]), [`rival`] asks whether they do better
-//! than effects that were taken for them, [`tell`] says what was found.
+//! than effects that were taken for them, [`tell`] says what was found, [`draw`] what shows it.
 
 mod bench;
+mod draw;
 mod monomial;
 mod motion;
 mod picture;

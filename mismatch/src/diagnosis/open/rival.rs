@@ -67,6 +67,8 @@ pub(crate) fn compared<'u, 'a>(
     };
     let second = hypothesis(ground, base, tests);
     let short = second.short.clone();
+    // Beside forms that were found beside everything, effects that lost what they explained go too.
+    let still = needed(&first.base, &first, &suspects, full, price * inflation);
     let needed = needed(&first.base, &second, &suspects, full, price * inflation);
     let third = if needed.terms.is_empty() {
         None
@@ -79,8 +81,15 @@ pub(crate) fn compared<'u, 'a>(
             (Hypothesis { picture, base, forms, curves, short: short.clone(), notes }, dropped)
         })
     };
+    let dropped: Vec<usize> = suspects.iter().copied().filter(|term| !still.terms.contains(term)).collect();
+    let fourth = (!dropped.is_empty()).then(|| refitted(&ground.units, full, robot, &dropped)).flatten();
+    let fourth = fourth.map(|base| {
+        let picture = built(&base, &still.curves, &still.forms);
+        let (forms, curves, notes) = (still.forms, still.curves, Vec::new());
+        (Hypothesis { picture, base, forms, curves, short: first.short.clone(), notes }, dropped)
+    });
     let mut best = (worth(&first), first, Vec::new());
-    for (own, dropped) in [Some((second, suspects)), third].into_iter().flatten() {
+    for (own, dropped) in [Some((second, suspects)), third, fourth].into_iter().flatten() {
         let own_worth = worth(&own);
         if own_worth > best.0 && !(own.forms.is_empty() && own.curves.is_empty()) {
             best = (own_worth, own, dropped);
