@@ -46,6 +46,7 @@ pub(crate) fn compared<'u, 'a>(
     if suspects.is_empty() {
         return (first, BTreeSet::new());
     }
+    let shown = suspects.clone();
     let inflations = first.forms.iter().map(|own| own.inflation);
     let inflation = inflations.chain(first.curves.iter().map(|own| own.inflation)).fold(1.0, f64::max);
     let rows: usize = ground.units.iter().map(|unit| unit.rows.len()).sum();
@@ -95,7 +96,25 @@ pub(crate) fn compared<'u, 'a>(
             best = (own_worth, own, dropped);
         }
     }
-    (best.1, best.2.into_iter().collect())
+    let mut displaced: BTreeSet<usize> = best.2.into_iter().collect();
+    displaced.extend(suspects_left(&best.1, full).into_iter().filter(|term| shown.contains(term)));
+    (best.1, displaced)
+}
+
+/// Terms of a fit of which nothing that matters is left beside what was found.
+fn suspects_left(found: &Hypothesis<'_, '_>, full: &Fit) -> BTreeSet<usize> {
+    let Some(unit) = found.picture.units.first() else { return BTreeSet::new() };
+    let mut matters = vec![None; full.terms.len()];
+    for (slot, &(term, parameter)) in found.base.slots.iter().enumerate() {
+        let own = &found.base.terms[term];
+        let Some(known) = full.terms.iter().position(|other| other.is_of(own)) else { continue };
+        let described = &own.parameters()[parameter];
+        let size = (own.values[parameter] - described.off + found.picture.moved[slot]).abs();
+        let threshold = described.relevance.threshold(&unit.floors);
+        let large = size.partial_cmp(&threshold) != Some(std::cmp::Ordering::Less);
+        matters[known] = Some(matters[known].unwrap_or(false) || large);
+    }
+    (0..matters.len()).filter(|&term| matters[term] == Some(false)).collect()
 }
 
 /// The terms of the world that are in a region in which only this robot drives: they may be its own.
