@@ -15,7 +15,10 @@ pub enum Verdict {
     Named,
     /// Several effects explain it about equally on these data.
     CannotTell,
-    /// Something is missing that no entry of the catalogue explains.
+    /// A product of what the robot did describes it, and no entry of the catalogue explains it: a form with a
+    /// unit, not a cause.
+    Form,
+    /// Something is missing that no entry of the catalogue explains, and no simple product either.
     Unnameable,
     /// Clock, truth or association is wrong: no physics.
     BadData,
@@ -76,6 +79,8 @@ pub struct Finding {
     pub p_familywise: f64,
     /// What it is worth on data that the fit did not see.
     pub held_out: HeldOut,
+    /// What is known of something unnameable.
+    pub shape: Option<Shape>,
     /// What to drive to tell the rivals apart.
     pub manoeuvre: Option<String>,
     /// What it is, in words.
@@ -84,6 +89,27 @@ pub struct Finding {
     pub equation: Option<String>,
     /// The line or section of configuration that applies it.
     pub configuration: String,
+}
+
+/// A curve that stands in for an expression: a natural cubic spline.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Shape {
+    /// What is off by the curve: `left velocity`.
+    pub of: String,
+    /// The unit of the curve.
+    pub unit: String,
+    /// What it is drawn over: `v`, `w`, `t`, `x`, `r` and so on.
+    pub regressor: String,
+    /// Its unit.
+    pub regressor_unit: String,
+    /// Knots of the spline, in the unit of the regressor. Beyond the ends the curve is constant.
+    pub knots: Vec<f64>,
+    /// The curve at the knots.
+    pub values: Vec<f64>,
+    /// Standard errors of these.
+    pub errors: Vec<f64>,
+    /// The share of the residual variance of the channel that it explains on data that the fit did not see.
+    pub residual_share: Estimate,
 }
 
 /// A fitted parameter.

@@ -49,10 +49,11 @@ pub use diagnosis::{
 pub use error::MismatchError;
 pub use evidence::Evidence;
 pub use findings::{
-    Estimate, Finding, Findings, HeldOut, Place, RobotRollOuts, RollOut, Undetected, Untestable, Verdict,
+    Estimate, Finding, Findings, HeldOut, Place, RobotRollOuts, RollOut, Shape, Undetected, Untestable,
+    Verdict,
 };
 pub use model::{nominal_model, nominal_models};
 pub use residual::{ChannelResiduals, Omission, Regime, Residual};
 pub use rollout::{HORIZONS_S, Rollout, rollouts};
 pub use summary::{MIN_RESIDUALS, Summary, summarize};
-pub use view::{PartialResidual, Plots, ResidualSeries};
+pub use view::{PartialResidual, Plots, ResidualSeries, ShapePlot};

@@ -49,6 +49,31 @@ pub struct PartialResidual {
     pub gain: Vec<[f64; 2]>,
 }
 
+/// What is left without a finding over what it depends on, with the curve that was found.
+#[derive(Clone, Debug)]
+pub struct ShapePlot {
+    /// The position among the findings.
+    pub finding: usize,
+    /// The name of the recording.
+    pub recording: String,
+    /// Which robot.
+    pub robot: u32,
+    /// Which channel.
+    pub channel: Channel,
+    /// The position among the channel's components.
+    pub component: usize,
+    /// The regressor: `v`.
+    pub regressor: String,
+    /// Its unit.
+    pub regressor_unit: String,
+    /// The regressor at every row; NaN where it is not known.
+    pub x: Vec<f64>,
+    /// What is left without the finding, in the component's unit.
+    pub residual: Vec<f64>,
+    /// The curve: regressor, residual.
+    pub curve: Vec<[f64; 2]>,
+}
+
 /// Everything to plot.
 #[derive(Clone, Debug, Default)]
 pub struct Plots {
@@ -56,6 +81,8 @@ pub struct Plots {
     pub residuals: Vec<ResidualSeries>,
     /// One or more per finding.
     pub partial: Vec<PartialResidual>,
+    /// Of findings without a name that depend on one thing.
+    pub shapes: Vec<ShapePlot>,
     /// True paths: robot, positions.
     pub paths: Vec<(u32, Vec<[f64; 2]>)>,
     /// Landmarks: number, position.

@@ -228,6 +228,9 @@ pub struct DiagnoseArgs {
     /// are none, parts of the recordings that are left out of the fit.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub test_on: Vec<String>,
+    /// Effects of the catalogue that are not tried, as in lateral_skid,crab: what is said of them without a name.
+    #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
+    pub without: Vec<String>,
     /// Leave out rows that cannot be read; they are counted and reported.
     #[arg(long)]
     pub skip_bad_rows: bool,

@@ -3,7 +3,7 @@
 //! [`unit`] makes one long vector of a robot's residuals, [`fit`] fits effects to it, [`candidate`] and
 //! [`starts`] say what could be added, [`white`] tests it, [`select`] adds and prunes, [`support`],
 //! [`held_out`] and [`naming`] decide what may be said of it, [`spread`] does the same for effects that leave the
-//! mean of the residuals where it is, [`run`] joins them.
+//! mean of the residuals where it is, [`open`] asks what none of them explains, [`run`] joins them.
 //!
 //! Without truth, [`mesh`] says how the residuals of a team hang together, and [`mesh_filter`] makes innovations of
 //! them.
@@ -23,6 +23,7 @@ mod mesh;
 mod mesh_filter;
 mod naming;
 mod noise;
+mod open;
 mod pairs;
 mod power;
 mod profile;

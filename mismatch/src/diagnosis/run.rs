@@ -15,6 +15,7 @@ use crate::diagnosis::fit::{Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
 use crate::diagnosis::lag::paired;
 use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, judge};
+use crate::diagnosis::open::{Opened, open};
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
 use crate::diagnosis::select::{Entry, Pool, Selected, select};
@@ -47,6 +48,8 @@ pub(crate) struct Judgement {
     pub(crate) support: Support,
     pub(crate) judged: Judged,
     pub(crate) gain: Gain,
+    /// What has no name and may be in its place.
+    pub(crate) unnamed_rivals: Vec<String>,
 }
 
 #[allow(clippy::too_many_lines, reason = "the pipeline from top to bottom")]
@@ -119,10 +122,16 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let groups = groups(&units, &fit.terms);
     let mut judgements = judgements(&units, &tests, &fit, &groups, (&pool, options.without.sets), count);
     let fit_alone = if by_reference { alone_under(&alone, &fit) } else { Some(fit.clone()) };
-    let spread = fit_alone.as_ref().map_or_else(Spread::default, |fit| {
+    let mut spread = fit_alone.as_ref().map_or_else(Spread::default, |fit| {
         spread::spread(&alone, &tests_alone, fit, &spread_entries, &swaps, count)
     });
     spread.explain(&mut judgements, &mut notes);
+    let recorded: Vec<String> = prepared.iter().map(|own| own.recording.name.clone()).collect();
+    // What is left against references is theirs too.
+    let opened =
+        if by_reference { Opened::default() } else { open(&units, &tests, &recorded, &fit, &spread, count) };
+    opened.displace(&mut judgements, &mut spread, &mut notes);
+    opened.doubt(&units, &mut judgements);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
@@ -137,7 +146,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         }
     }
     let named = |group: &&Vec<usize>| found.iter().any(|own| own.group == **group);
-    let unexplained = groups.iter().filter(|group| !spread.explains(group[0]));
+    let explained = |term: usize| spread.explains(term) || opened.displaced.contains(&term);
+    let unexplained = groups.iter().filter(|group| !explained(group[0]));
     notes.extend(unexplained.filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
     notes.extend(spread.nuisances());
     notes.extend(
@@ -153,6 +163,12 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let rolled = if by_reference { BTreeMap::new() } else { rolled::robots(&roller, &kept) };
     let mut findings: Vec<Finding> = parallel::map(&found, |own| finding(&units, &rolled, own));
     findings.extend(spread.found().into_iter().map(SpreadTerm::finding));
+    let named_count = findings.len();
+    findings.extend(opened.found.iter().map(|own| own.finding.clone()));
+    notes.extend(opened.notes.iter().cloned());
+    if !opened.found.is_empty() {
+        notes.push("what has no name is not in the corrected model".to_owned());
+    }
     let mut undetected = undetected(&units, &scored, count);
     undetected.extend_from_slice(&spread.undetected);
     entries.untestable.extend_from_slice(&spread.untestable);
@@ -175,7 +191,8 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         roll_outs: rolled::per_robot(&rolled, &units),
         notes,
     };
-    let plots = series::plots(&prepared, &units, &fit, &kept, &found);
+    let mut plots = series::plots(&prepared, &units, &fit, &kept, &found);
+    opened.plot(named_count, &mut plots);
     let corrected = prepared
         .iter()
         .map(|own| (own.recording.name.clone(), corrected::corrected(own, &corrected_terms)))
@@ -289,7 +306,7 @@ fn judgements(
             on_tests(tests, &fit.terms[group[0]], &support)
         };
         let judged = judge(units, &support, gain, count);
-        all.push(Judgement { group: group.clone(), support, judged, gain });
+        all.push(Judgement { group: group.clone(), support, judged, gain, unnamed_rivals: Vec::new() });
     }
     all
 }
@@ -337,6 +354,7 @@ fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgem
     let mut support_set: Vec<String> =
         own.support.members.iter().map(|effect| effect.name().to_owned()).collect();
     support_set.dedup();
+    support_set.extend_from_slice(&own.unnamed_rivals);
     let verdict = own.judged.verdict.unwrap_or(Verdict::CannotTell);
     let manoeuvre = (verdict == Verdict::CannotTell).then(|| info.broken_by.to_owned());
     Finding {
@@ -357,6 +375,7 @@ fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgem
             log_score_gain_se: own.gain.standard_error,
             rollout_rmse: rolled::of_finding(rolled, units, own),
         },
+        shape: None,
         manoeuvre,
         // Sentences are the reader's: who writes the findings fills this.
         summary: String::new(),
@@ -365,7 +384,7 @@ fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgem
 }
 
 impl Judgement {
-    fn name(&self) -> &'static str {
+    pub(crate) fn name(&self) -> &'static str {
         self.judged.estimated[0].term.effect.name()
     }
 
@@ -393,7 +412,7 @@ fn hidden(units: &[&Unit<'_>], entries: &[Entry], fit: &Fit, pool: &Pool) -> Vec
 
 /// That nothing is missing is said if, of what was `tried`, more could be tested than could not.
 fn overall(findings: &[Finding], tried: usize, untestable: usize) -> Verdict {
-    let order = [Verdict::Named, Verdict::BadData, Verdict::CannotTell, Verdict::Unnameable];
+    let order = [Verdict::Named, Verdict::BadData, Verdict::CannotTell, Verdict::Form, Verdict::Unnameable];
     order
         .into_iter()
         .find(|verdict| findings.iter().any(|finding| finding.verdict == *verdict))

@@ -81,7 +81,7 @@ fn partial(
 ) {
     let (with, without) = (&own.support.with.states[position], &own.support.without.states[position]);
     let Some(stretch) = unit.stretch(own.judged.channel) else { return };
-    let gain = gain(unit, with, without);
+    let gain = gain_over_time(unit, with, without);
     for component in 0..stretch.components {
         let indices = || stretch.range().skip(component).step_by(stretch.components);
         let predicted: Vec<f64> =
@@ -104,7 +104,7 @@ fn partial(
 }
 
 /// Log-likelihood gained, summed from the start.
-fn gain(
+pub(crate) fn gain_over_time(
     unit: &Unit<'_>,
     with: &crate::diagnosis::fit::State,
     without: &crate::diagnosis::fit::State,

@@ -8,7 +8,7 @@ mod replay;
 pub use demo::{DemoCase, DemoReport, demo_report};
 pub use diagnose::{
     Claim, DiagnoseReport, DiagnosedRecording, Evidence, Found, HorizonError, NotTested, ParameterEstimate,
-    ResidualColumns, RobotRollOut, STAGES, SmallestDetectable, StageTest, diagnose_report,
+    ResidualColumns, RobotRollOut, STAGES, ShapeColumns, SmallestDetectable, StageTest, diagnose_report,
 };
 pub use faults::{FaultsReport, FaultsRow, faults_report};
 pub use replay::{FactCount, ReplayReport, RobotScore, replay_report, run_report};

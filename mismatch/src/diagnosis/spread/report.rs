@@ -67,6 +67,7 @@ impl SpreadTerm {
                 log_score_gain_se: self.gain.standard_error,
                 rollout_rmse: Vec::new(),
             },
+            shape: None,
             manoeuvre: (self.support.len() > 1).then(|| info.broken_by.to_owned()),
             summary: String::new(),
             equation: Some(info.equation.to_owned()),

@@ -24,6 +24,7 @@ pub fn finding(effect: &str, parameters: &[(&str, f64, [f64; 2], &str)]) -> Find
         place: Place::default(),
         p_familywise: 1e-6,
         held_out: HeldOut { log_score_gain: 40.0, log_score_gain_se: 5.0, rollout_rmse: Vec::new() },
+        shape: None,
         manoeuvre: None,
         summary: String::new(),
         equation: None,

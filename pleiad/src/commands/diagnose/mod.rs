@@ -14,6 +14,7 @@ use std::path::Path;
 use anyhow::Context;
 use pleiad_benchmark::manoeuvre::{advice, proposals};
 use pleiad_mismatch::{DiagnoseOptions, Findings, TruthUse, diagnose};
+use pleiad_physics::Effect;
 use pleiad_recording::{Nominal, ReadOptions, Recording, read_model};
 use pleiad_report::{diagnose_report, write_summary};
 
@@ -21,6 +22,7 @@ use crate::cli::{DiagnoseArgs, TruthArg};
 use crate::{folder, output, setup};
 
 pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
+    let leave_out = without(&args.without)?;
     let mut chosen = choice::choose(args)?;
     let model = args.model.as_deref().map(model).transpose()?;
     let spinner = output::spinner("reading");
@@ -41,6 +43,7 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
         test_on: chosen.test_on,
         truth,
         without_landmarks: args.without_landmarks,
+        leave_out,
         ..DiagnoseOptions::default()
     };
     let mut diagnosis = diagnose(&recordings, &options)?;
@@ -70,6 +73,14 @@ fn advise(recordings: &[Recording], findings: &mut Findings, options: &DiagnoseO
             finding.manoeuvre = Some(advice(&all, known));
         }
     }
+}
+
+fn without(names: &[String]) -> anyhow::Result<Vec<Effect>> {
+    let effect = |name: &String| {
+        Effect::from_name(name)
+            .with_context(|| format!("--without: no effect is called {name}; `pleiad effects` lists them"))
+    };
+    names.iter().map(effect).collect()
 }
 
 fn model(path: &Path) -> anyhow::Result<Nominal> {

@@ -9,7 +9,7 @@ use pleiad_physics::Effect;
 use pleiad_recording::Recording;
 use pleiad_report::{
     Claim, DiagnoseReport, DiagnosedRecording, Evidence, Found, HorizonError, Landmark, NotTested,
-    ParameterEstimate, ResidualColumns, RobotRollOut, SmallestDetectable, StageTest,
+    ParameterEstimate, ResidualColumns, RobotRollOut, ShapeColumns, SmallestDetectable, StageTest,
 };
 
 use super::corrected::seconds;
@@ -71,6 +71,7 @@ pub(super) fn report(
         notes: findings.notes.clone(),
         residuals,
         evidence: plots.partial.iter().map(evidence).collect(),
+        shapes: plots.shapes.iter().map(shape).collect(),
         paths: plots.paths.iter().map(|(robot, path)| (RobotId(*robot), path.clone())).collect(),
         landmarks: plots
             .landmarks
@@ -94,6 +95,7 @@ fn claim(verdict: Verdict) -> Claim {
     match verdict {
         Verdict::Named => Claim::Named,
         Verdict::CannotTell => Claim::CannotTell,
+        Verdict::Form => Claim::Form,
         Verdict::Unnameable => Claim::Unnameable,
         Verdict::BadData => Claim::BadData,
         Verdict::NothingMissing => Claim::NothingMissing,
@@ -103,7 +105,8 @@ fn claim(verdict: Verdict) -> Claim {
 
 fn found(finding: &Finding) -> Found {
     let name = finding.effect.as_deref().or(finding.expression.as_deref());
-    let rivals = finding.support_set.iter().filter(|rival| finding.effect.as_ref() != Some(rival));
+    let own = finding.effect.as_ref().or(finding.expression.as_ref());
+    let rivals = finding.support_set.iter().filter(|rival| own != Some(rival));
     Found {
         claim: claim(finding.verdict),
         robots: finding.robots.iter().map(|robot| RobotId(*robot)).collect(),
@@ -196,6 +199,23 @@ fn evidence(own: &pleiad_mismatch::PartialResidual) -> Evidence {
         predicted: own.predicted.clone(),
         residual: own.residual.clone(),
         gain: own.gain.clone(),
+    }
+}
+
+fn shape(own: &pleiad_mismatch::ShapePlot) -> ShapeColumns {
+    let (component, unit) = component(own.channel, own.component);
+    ShapeColumns {
+        finding: own.finding,
+        recording: own.recording.clone(),
+        robot: RobotId(own.robot),
+        channel: words(own.channel).to_owned(),
+        component,
+        unit,
+        regressor: own.regressor.clone(),
+        regressor_unit: own.regressor_unit.clone(),
+        x: own.x.clone(),
+        residual: own.residual.clone(),
+        curve: own.curve.clone(),
     }
 }
 

@@ -16,6 +16,7 @@ pub(super) fn claim_words(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Named => "named",
         Verdict::CannotTell => "these data cannot tell several effects apart",
+        Verdict::Form => "something is missing that no known effect explains; a formula describes it",
         Verdict::Unnameable => "something is missing that no known effect explains",
         Verdict::BadData => "the data are wrong, not the physics",
         Verdict::NothingMissing => "nothing missing",
@@ -58,7 +59,17 @@ pub(super) fn sentences(finding: &Finding) -> Vec<String> {
     let plain = |(name, own): (&String, &Estimate)| {
         format!("{name} is {}", with_interval(own.value, own.ci95, &own.unit))
     };
-    shape.into_iter().chain(finding.parameters.iter().map(plain)).collect()
+    let curve = finding.shape.as_ref().map(|own| {
+        let share = &own.residual_share;
+        let [low, high] = share.ci95.map(|end| 100.0 * end);
+        format!(
+            "its {} is off by a curve over {} that explains {} of what is left there",
+            own.of,
+            own.regressor,
+            with_interval(100.0 * share.value, [low, high], "%")
+        )
+    });
+    shape.into_iter().chain(curve).chain(finding.parameters.iter().map(plain)).collect()
 }
 
 /// The phrase with its parameters filled in; `None` if the finding lacks one.

@@ -84,6 +84,9 @@ fn lines(finding: &Finding) -> String {
         let names: Vec<&str> = finding.support_set.iter().map(|name| title(name)).collect();
         let _ = write!(text, ": {}", names.join(" / "));
     }
+    if finding.verdict == Verdict::Form && finding.support_set.len() > 1 {
+        let _ = write!(text, ": on these data the same as {}", finding.support_set[1..].join(" / "));
+    }
     let _ = write!(text, "\n   {}", finding.summary);
     let held_out = &finding.held_out;
     let (gain, error) = (quantity(held_out.log_score_gain, ""), quantity(held_out.log_score_gain_se, ""));

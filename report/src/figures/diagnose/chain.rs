@@ -120,7 +120,7 @@ fn cell(
 fn mark(claim: Claim, number: usize, x: f64, y: f64) -> String {
     let (class, shape) = match claim {
         Claim::CannotTell => ("either", format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{MARK}\"/>")),
-        Claim::Unnameable => {
+        Claim::Form | Claim::Unnameable => {
             let (r, x0, y0) = (MARK + 3.0, x, y);
             ("nameless", format!("<path d=\"M{x0} {}l{r} {r}l-{r} {r}l-{r} -{r}z\"/>", y0 - r))
         }

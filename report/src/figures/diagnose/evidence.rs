@@ -3,7 +3,7 @@
 use crate::decimate::even_sample;
 use crate::figures::diagnose::scale::readable;
 use crate::figures::robot_name;
-use crate::reports::diagnose::Evidence;
+use crate::reports::diagnose::{Evidence, ShapeColumns};
 use crate::{Axis, Colour, Dash, Figure, Trace, indices_keeping_extremes};
 
 /// Points of a cloud: enough for its shape.
@@ -76,6 +76,48 @@ pub(crate) fn partial_figure(evidence: &Evidence) -> Option<Figure> {
                 "circle",
                 8.0,
             )),
+    )
+}
+
+/// Whose shape it is, for a heading.
+pub(crate) fn name_of_shape(shape: &ShapeColumns) -> String {
+    let of = if shape.recording.is_empty() { String::new() } else { format!(" of {}", shape.recording) };
+    format!("{}{of}: {}, over {}", robot_name(shape.robot), shape.component, shape.regressor)
+}
+
+/// What is left of the residual over what it depends on, with the curve that was found. `None` without points.
+pub(crate) fn shape_figure(shape: &ShapeColumns) -> Option<Figure> {
+    let mut points: Vec<[f64; 2]> = shape
+        .x
+        .iter()
+        .zip(&shape.residual)
+        .map(|(x, residual)| [*x, *residual])
+        .filter(|point| point.iter().all(|value| value.is_finite()))
+        .collect();
+    let (scale, unit) = readable(points.iter().map(|point| &point[1]), &shape.unit);
+    for point in &mut points {
+        point[1] *= scale;
+    }
+    let least = points.iter().map(|point| point[0]).fold(f64::INFINITY, f64::min);
+    let greatest = points.iter().map(|point| point[0]).fold(f64::NEG_INFINITY, f64::max);
+    if least >= greatest || points.is_empty() {
+        return None;
+    }
+    let cloud: Vec<[f64; 2]> =
+        even_sample(points.len(), CLOUD_POINTS).into_iter().map(|index| points[index]).collect();
+    let column =
+        |points: &[[f64; 2]], axis: usize| points.iter().map(|point| point[axis]).collect::<Vec<f64>>();
+    let curve: Vec<[f64; 2]> = shape.curve.iter().map(|[x, y]| [*x, y * scale]).collect();
+    let means = stripe_means(&points, [least, greatest]);
+    let circle = |name: &str, points: &[[f64; 2]], colour, size| {
+        Trace::markers(name, &column(points, 0), &column(points, 1), colour, "circle", size)
+    };
+    Some(
+        Figure::new(Axis::new(&shape.regressor, &shape.regressor_unit), Axis::new("left without it", &unit))
+            .height(340)
+            .trace(circle("residuals", &cloud, Colour::Series(4), 3.0).opacity(0.5))
+            .trace(Trace::line("curve found", &column(&curve, 0), &column(&curve, 1), Colour::Ink))
+            .trace(circle("means", &means, Colour::Series(1), 8.0)),
     )
 }
 

@@ -15,6 +15,8 @@ pub enum Claim {
     Named,
     /// Several effects explain it about equally.
     CannotTell,
+    /// No known effect explains it; a product of what the robot did describes it.
+    Form,
     /// Something is missing that no known effect explains.
     Unnameable,
     /// Clock, truth or association is wrong.
@@ -54,6 +56,8 @@ pub struct DiagnoseReport {
     pub residuals: Vec<ResidualColumns>,
     /// The evidence of the findings.
     pub evidence: Vec<Evidence>,
+    /// Of findings that depend on one thing and have no name: what is left of the residual over it.
+    pub shapes: Vec<ShapeColumns>,
     /// True paths: robot, positions in metres.
     pub paths: Vec<(RobotId, Vec<[f64; 2]>)>,
     /// The map.
@@ -207,6 +211,33 @@ pub struct ResidualColumns {
     pub sigma: f64,
     /// True position, metres, where it is known.
     pub position_m: Vec<Option<[f64; 2]>>,
+}
+
+/// What is left of a residual over what it depends on: columns of equal length, and a curve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapeColumns {
+    /// The position among the findings.
+    pub finding: usize,
+    /// The recording it is from; empty if there is only one.
+    pub recording: String,
+    /// Which robot.
+    pub robot: RobotId,
+    /// The channel, for people.
+    pub channel: String,
+    /// The component, for people.
+    pub component: String,
+    /// The component's unit.
+    pub unit: String,
+    /// What it depends on: `v`.
+    pub regressor: String,
+    /// Its unit.
+    pub regressor_unit: String,
+    /// The regressor; NaN where it is not known.
+    pub x: Vec<f64>,
+    /// The residual with everything but this finding corrected.
+    pub residual: Vec<f64>,
+    /// The curve: regressor, residual.
+    pub curve: Vec<[f64; 2]>,
 }
 
 /// The evidence of one finding in one component of a channel.

@@ -5,7 +5,8 @@ use pleiad_estimation::RobotId;
 use super::data::{DiagnoseReport, Evidence, Found};
 use super::words::{heading, standing};
 use crate::figures::diagnose::{
-    gain_floor, partial_figure, residual_floors, roll_out_panels, series_panels, spread_figure, strip_figure,
+    gain_floor, name_of_shape, partial_figure, residual_floors, roll_out_panels, series_panels, shape_figure,
+    spread_figure, strip_figure,
 };
 use crate::number::{two_digits, with_interval};
 use crate::{Document, Panel, Table};
@@ -71,6 +72,18 @@ fn evidence(index: usize, finding: &Found, report: &DiagnoseReport, mut document
          finding predicts there. Points around the dashed line of slope one are explained; a flat cloud is not. Large \
          points are means of stripes.",
     );
+    let shapes = report.shapes.iter().filter(|shape| shape.finding == index).take(PARTIALS);
+    let shapes = shapes.filter_map(|shape| {
+        let heading = super::words::capital(&name_of_shape(shape));
+        Some(Panel { heading, figure: shape_figure(shape)? })
+    });
+    let shapes: Vec<Panel> = shapes.collect();
+    if !shapes.is_empty() {
+        document = document.panels(
+            shapes,
+            "The same over what it depends on, with the curve that was found. Large points are means of stripes.",
+        );
+    }
     let when = strip_figure(&own, &finding.time_s).map(|figure| ("When", figure));
     let place = gain_floor(report, finding, &own).map(|figure| ("Where", figure));
     let caption = match (&when, &place) {

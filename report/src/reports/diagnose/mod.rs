@@ -7,7 +7,7 @@ mod words;
 
 pub use data::{
     Claim, DiagnoseReport, DiagnosedRecording, Evidence, Found, HorizonError, NotTested, ParameterEstimate,
-    ResidualColumns, RobotRollOut, STAGES, SmallestDetectable, StageTest,
+    ResidualColumns, RobotRollOut, STAGES, ShapeColumns, SmallestDetectable, StageTest,
 };
 
 use crate::{Document, ReportError};
@@ -24,6 +24,9 @@ pub fn diagnose_report(report: &DiagnoseReport) -> Result<Document, ReportError>
     for evidence in &report.evidence {
         let found = [evidence.predicted.len(), evidence.residual.len()];
         check(evidence.robot, &evidence.channel, evidence.time_s.len(), &found)?;
+    }
+    for shape in &report.shapes {
+        check(shape.robot, &shape.channel, shape.x.len(), &[shape.residual.len()])?;
     }
     let names: Vec<&str> = report.recordings.iter().map(|recording| recording.name.as_str()).collect();
     let mut document = Document::new(format!("Diagnosis: {}", names.join(", ")));

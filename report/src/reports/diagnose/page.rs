@@ -67,7 +67,7 @@ fn chain_caption(report: &DiagnoseReport) -> String {
     if has(Claim::CannotTell) {
         shapes.push("ring: one of several effects".to_owned());
     }
-    if has(Claim::Unnameable) {
+    if has(Claim::Form) || has(Claim::Unnameable) {
         shapes.push("diamond: no known effect explains it".to_owned());
     }
     if has(Claim::BadData) {

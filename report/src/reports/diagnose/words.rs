@@ -19,6 +19,7 @@ impl Claim {
         match self {
             Self::Named => "named",
             Self::CannotTell => "cannot tell",
+            Self::Form => "missing, a form",
             Self::Unnameable => "missing, unnameable",
             Self::BadData => "bad data",
             Self::NothingMissing => "nothing missing",
@@ -30,6 +31,7 @@ impl Claim {
     fn counted(self) -> &'static str {
         match self {
             Self::CannotTell => "with several explanations that these data cannot tell apart",
+            Self::Form => "that no known effect explains but a formula describes",
             Self::Unnameable => "that no known effect explains",
             Self::BadData => "of bad data",
             other => other.badge(),
@@ -40,7 +42,7 @@ impl Claim {
         match self {
             Self::NothingMissing => Tone::Good,
             Self::Named | Self::BadData => Tone::Bad,
-            Self::CannotTell | Self::Unnameable | Self::Untestable => Tone::Open,
+            Self::CannotTell | Self::Form | Self::Unnameable | Self::Untestable => Tone::Open,
         }
     }
 
@@ -50,6 +52,9 @@ impl Claim {
             Self::Named => "The model leaves something out, and it has a name.",
             Self::CannotTell => {
                 "The model leaves something out; these data cannot tell which of several effects it is."
+            }
+            Self::Form => {
+                "The model leaves something out that no known effect explains; a formula describes it."
             }
             Self::Unnameable => "The model leaves something out that no known effect explains.",
             Self::BadData => "The data are wrong, not the physics.",
@@ -174,6 +179,16 @@ pub(super) fn standing(finding: &Found) -> &'static str {
 
 /// The rivals that remain.
 pub(super) fn rivals(finding: &Found) -> String {
+    if finding.claim == Claim::Form {
+        let others = if finding.rivals.is_empty() {
+            "No other simple form does about as well".to_owned()
+        } else {
+            format!("On these data the same: {}", joined(&finding.rivals, "or"))
+        };
+        return format!(
+            "No effect of the catalogue explains it; a form is a description and no cause. {others}."
+        );
+    }
     if finding.claim == Claim::Unnameable {
         return "Every effect of the catalogue was tried and falls short; the shape below is a description."
             .to_owned();
@@ -266,7 +281,7 @@ pub(super) fn overview(report: &DiagnoseReport) -> String {
         _ => {
             let count = report.findings.len();
             let findings = if count == 1 { "1 finding".to_owned() } else { format!("{count} findings") };
-            let counted: Vec<String> = [Claim::Named, Claim::CannotTell, Claim::Unnameable, Claim::BadData]
+            let counted: Vec<String> = [Claim::Named, Claim::CannotTell, Claim::Form, Claim::Unnameable, Claim::BadData]
                 .into_iter()
                 .map(|claim| (claim, report.findings.iter().filter(|finding| finding.claim == claim).count()))
                 .filter(|(_, count)| *count > 0)
