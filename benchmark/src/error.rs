@@ -23,6 +23,12 @@ pub enum BenchmarkError {
     /// No seed.
     #[error("0 seeds: nothing would be run; ask for at least 1")]
     NoSeeds,
+    /// Nothing that could be left away.
+    #[error("found {found:?}, expected one of {}", crate::ABLATIONS.join(", "))]
+    NoAblation {
+        /// What was asked for.
+        found: String,
+    },
     /// Nothing has a name like this.
     #[error("no case of the classes asked for has {} in its name; names are as {example}", found.join(" or "))]
     NoCase {

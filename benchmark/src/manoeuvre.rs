@@ -50,26 +50,36 @@ pub fn proposals(
     if finding.verdict != Verdict::CannotTell || rivals.is_empty() {
         return None;
     }
-    let base = scenario(recording, robot, active(best, finding)?)?;
-    let own = base.robots.get(&robot)?;
-    let kinds = ManoeuvreKind::ALL
-        .into_iter()
-        .filter(|kind| !(kind.on_the_spot() && own.drive.kind == DriveKind::CarLike));
+    tell_apart(recording, robot, active(best, finding)?, &rivals, options)
+}
+
+/// The same of an effect of a robot and others that may be in its place.
+pub fn tell_apart(
+    recording: &Recording,
+    robot: RobotId,
+    best: ActiveEffect<f64>,
+    rivals: &[Effect],
+    options: &DiagnoseOptions,
+) -> Option<Vec<Proposal>> {
+    let effect = best.effect();
+    let base = scenario(recording, robot, best)?;
+    let is_car = base.robots.get(&robot)?.drive.kind == DriveKind::CarLike;
+    let kinds = ManoeuvreKind::ALL.into_iter().filter(|kind| !(kind.on_the_spot() && is_car));
     let alone = DiagnoseOptions { fit_on: Vec::new(), test_on: Vec::new(), ..options.clone() };
-    let kinds: Vec<ManoeuvreKind> = kinds.collect();
-    let one = |&manoeuvre: &ManoeuvreKind| {
+    let one = |manoeuvre: ManoeuvreKind| {
         let mut scenario = base.clone();
         for settings in scenario.robots.values_mut() {
             settings.motion.manoeuvres = vec![manoeuvre];
         }
         let run = simulate(&scenario, SEED).ok()?;
         let of = |effect: Effect| log_likelihood(&run.recording, robot, &[effect], &alone).ok();
-        let explained = of(best)?;
+        let explained = of(effect)?;
         let ratios = rivals.iter().filter_map(|&rival| Some(explained - of(rival)?));
         let least = ratios.fold(f64::INFINITY, f64::min);
-        least.is_finite().then_some(Proposal { manoeuvre, ratio_per_minute: least.max(0.0) * 60.0 / SECONDS })
+        let ratio_per_minute = least.max(0.0) * 60.0 / SECONDS;
+        least.is_finite().then_some(Proposal { manoeuvre, ratio_per_minute })
     };
-    let mut all: Vec<Proposal> = kinds.iter().filter_map(one).collect();
+    let mut all: Vec<Proposal> = kinds.filter_map(one).collect();
     all.sort_by(|a, b| b.ratio_per_minute.total_cmp(&a.ratio_per_minute));
     Some(all)
 }
@@ -223,4 +233,37 @@ fn duration_s(recording: &Recording) -> f64 {
         Some(last.time.seconds_since(first.time))
     });
     spans.fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A robot with a gyro among landmarks.
+    fn recording() -> Recording {
+        let text = "name = \"small\"\nduration_s = 10.0\nteam_size = 1\nrandom_landmarks = 6\n\
+                    [defaults.odometry]\nkind = \"wheels\"\nrate_hz = 50.0\n\
+                    [defaults.gyro]\nrate_hz = 50.0\n[defaults.relative]\nrate_hz = 5.0\nsee = \"both\"\n";
+        simulate(&Scenario::from_toml(text, "small.toml").unwrap(), 3).unwrap().recording
+    }
+
+    #[test]
+    fn what_scales_with_turning_is_told_from_a_bias_by_turning_and_not_by_standing() {
+        let best = ActiveEffect::new(Effect::GyroScale, &[0.03]).unwrap();
+        let rivals = [Effect::GyroBias];
+        let found = tell_apart(&recording(), RobotId(1), best, &rivals, &DiagnoseOptions::default()).unwrap();
+        let of =
+            |kind: ManoeuvreKind| found.iter().find(|own| own.manoeuvre == kind).unwrap().ratio_per_minute;
+        // A scale shows in turns both ways alone; where nothing turns both explain nothing.
+        assert!(of(ManoeuvreKind::Standstill) < LEAST_RATIO, "{found:?}");
+        assert!(of(ManoeuvreKind::Turn) > 30.0, "{found:?}");
+        assert!(found[0].ratio_per_minute >= of(ManoeuvreKind::Turn));
+        assert!(advice(&found, "").contains(found[0].manoeuvre.name()));
+    }
+
+    #[test]
+    fn where_nothing_helps_the_catalogue_says_what_would() {
+        let proposals = [Proposal { manoeuvre: ManoeuvreKind::Turn, ratio_per_minute: 1.0 }];
+        assert!(advice(&proposals, "a second gyro").ends_with("a second gyro"));
+    }
 }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use pleiad_mismatch::{DiagnoseOptions, Diagnosis, Without, design, diagnose};
+use pleiad_mismatch::{DiagnoseOptions, Diagnosis, TruthUse, design, diagnose};
 use pleiad_recording::Recording;
 use pleiad_sim_peers::{Scenario, simulate};
 
@@ -38,8 +38,8 @@ pub struct Options {
     pub only: Vec<String>,
     /// Takes up a run that stopped.
     pub resume: bool,
-    /// Whether diagnoses that lack a part are run as well.
-    pub ablations: bool,
+    /// Which diagnoses that lack something are run as well, of [`ABLATIONS`].
+    pub ablations: Vec<String>,
     /// Whether other methods are run as well.
     pub baselines: bool,
     /// Where seal, answers and results are written.
@@ -84,6 +84,9 @@ pub fn chosen(options: &Options) -> Result<Vec<Plan>, BenchmarkError> {
 /// See [`BenchmarkError`].
 pub fn run(options: &Options, tell: &mut dyn FnMut(&str)) -> Result<Outcome, BenchmarkError> {
     let plans = chosen(options)?;
+    for name in &options.ablations {
+        lacking(name, &DiagnoseOptions::default())?;
+    }
     let file = options.folder.join(RESULTS);
     if !options.resume && file.exists() {
         return Err(BenchmarkError::AlreadyThere { file });
@@ -137,11 +140,9 @@ fn one(plan: &Plan, options: &Options) -> Result<CaseResult, BenchmarkError> {
     let asked = DiagnoseOptions { leave_out: case.left_out.clone(), ..DiagnoseOptions::default() };
     let (said, tool) = diagnosed(&case, std::slice::from_ref(&recording), &asked)?;
     let mut ablations = BTreeMap::new();
-    if options.ablations {
-        for (name, without) in ABLATIONS {
-            let asked = DiagnoseOptions { without, ..asked.clone() };
-            ablations.insert(name.to_owned(), diagnosed(&case, std::slice::from_ref(&recording), &asked)?.1);
-        }
+    for name in &options.ablations {
+        let asked = lacking(name, &asked)?;
+        ablations.insert(name.clone(), diagnosed(&case, std::slice::from_ref(&recording), &asked)?.1);
     }
     let mismatch = |source| BenchmarkError::Mismatch { id: case.answer.id.clone(), source };
     let oracle = oracle(&recording, &case.answer, &said.findings).map_err(mismatch)?;
@@ -165,12 +166,25 @@ fn one(plan: &Plan, options: &Options) -> Result<CaseResult, BenchmarkError> {
     })
 }
 
-/// Parts of the diagnosis that are left away, one at a time.
-pub const ABLATIONS: [(&str, Without); 3] = [
-    ("no_blocks", Without { blocks: true, scans: false, sets: false }),
-    ("no_scans", Without { blocks: false, scans: true, sets: false }),
-    ("no_sets", Without { blocks: false, scans: false, sets: true }),
-];
+/// What can be left away: errors correlated within blocks, onsets and places, rivals, ground truth, and landmarks with it.
+pub const ABLATIONS: [&str; 5] = ["no_blocks", "no_scans", "no_sets", "no_truth", "no_landmarks"];
+
+/// A diagnosis that lacks something.
+fn lacking(name: &str, asked: &DiagnoseOptions) -> Result<DiagnoseOptions, BenchmarkError> {
+    let mut own = asked.clone();
+    match name {
+        "no_blocks" => own.without.blocks = true,
+        "no_scans" => own.without.scans = true,
+        "no_sets" => own.without.sets = true,
+        "no_truth" => own.truth = TruthUse::No,
+        "no_landmarks" => {
+            own.truth = TruthUse::No;
+            own.without_landmarks = true;
+        }
+        _ => return Err(BenchmarkError::NoAblation { found: name.to_owned() }),
+    }
+    Ok(own)
+}
 
 fn recorded(case: &Case, scenario: &Scenario, seed: u64) -> Result<Recording, BenchmarkError> {
     let id = || case.answer.id.clone();

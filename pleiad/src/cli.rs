@@ -264,9 +264,10 @@ pub struct ConcealedArgs {
     /// Only cases with one of these in their names, as in single/crab/x1/white/1.
     #[arg(long, value_name = "TEXT", num_args = 1..)]
     pub only: Vec<String>,
-    /// Also diagnose without blocks of time, without scans for places and onsets, and without sets.
-    #[arg(long)]
-    pub ablations: bool,
+    /// Also diagnose without something: no_blocks of time, no_scans for places and onsets, no_sets, no_truth, no_landmarks
+    /// (and no truth). All if none is named.
+    #[arg(long, value_name = "NAME", num_args = 0.., value_delimiter = ',')]
+    pub ablations: Option<Vec<String>>,
     /// Leave away the other methods: sparse regression, lasso, joint fit.
     #[arg(long)]
     pub no_baselines: bool,

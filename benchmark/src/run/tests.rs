@@ -11,7 +11,7 @@ fn options(folder: &Path) -> Options {
         seeds: 1,
         only: vec!["clean/".to_owned()],
         resume: true,
-        ablations: false,
+        ablations: Vec::new(),
         baselines: false,
         folder: folder.to_owned(),
     }

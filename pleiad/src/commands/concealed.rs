@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Context;
-use pleiad_benchmark::{Asked, Class, Options, Outcome, Summary, chosen, page, run as run_cases, summary};
+use pleiad_benchmark::{
+    ABLATIONS, Asked, Class, Options, Outcome, Summary, chosen, page, run as run_cases, summary,
+};
 use pleiad_report::write_summary;
 
 use crate::cli::ConcealedArgs;
@@ -21,7 +23,11 @@ pub fn run(args: &ConcealedArgs) -> anyhow::Result<()> {
         seeds: args.seeds,
         only: args.only.clone(),
         resume: args.resume,
-        ablations: args.ablations,
+        ablations: match args.ablations.as_deref() {
+            None => Vec::new(),
+            Some([]) => ABLATIONS.map(str::to_owned).to_vec(),
+            Some(names) => names.to_vec(),
+        },
         baselines: !args.no_baselines,
         folder: Path::new("").to_owned(),
     };
@@ -59,8 +65,9 @@ fn command(args: &ConcealedArgs) -> String {
     if !args.only.is_empty() {
         let _ = write!(text, " --only {}", args.only.join(" "));
     }
-    if args.ablations {
-        text += " --ablations";
+    if let Some(names) = &args.ablations {
+        text += " --ablations ";
+        text += &names.join(",");
     }
     if args.no_baselines {
         text += " --no-baselines";
