@@ -5,14 +5,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use pleiad_mismatch::{DiagnoseOptions, Diagnosis, TruthUse, design, diagnose};
+use pleiad_mismatch::{DiagnoseOptions, Diagnosis, Findings, TruthUse, design, diagnose};
 use pleiad_recording::Recording;
+use pleiad_sim_peers::scenario::ManoeuvreKind;
 use pleiad_sim_peers::{Scenario, simulate};
 
 use crate::baseline::{self, Selection};
 use crate::cases::{Case, Plan, added, plans};
 use crate::class::Asked;
 use crate::error::BenchmarkError;
+use crate::manoeuvre::{LEAST_RATIO, proposals};
 use crate::oracle::oracle;
 use crate::results::{self, CaseResult};
 use crate::score::{Scored, score};
@@ -146,7 +148,7 @@ fn one(plan: &Plan, options: &Options) -> Result<CaseResult, BenchmarkError> {
     }
     let mismatch = |source| BenchmarkError::Mismatch { id: case.answer.id.clone(), source };
     let oracle = oracle(&recording, &case.answer, &said.findings).map_err(mismatch)?;
-    let added = with_manoeuvre(&case, &recording, &tool, &asked)?;
+    let added = with_manoeuvre(&case, &recording, &said.findings, &asked)?;
     let mut baselines: BTreeMap<String, Selection> = BTreeMap::new();
     if options.baselines {
         let design = design(&recording, &case.left_out).map_err(mismatch)?;
@@ -212,14 +214,21 @@ fn diagnosed(
 fn with_manoeuvre(
     case: &Case,
     recording: &Recording,
-    tool: &Scored,
+    findings: &Findings,
     asked: &DiagnoseOptions,
 ) -> Result<Option<Scored>, BenchmarkError> {
-    let Some(proposal) = &tool.manoeuvre else { return Ok(None) };
-    let Some(scenario) = added(case, proposal)? else { return Ok(None) };
+    let Some(proposal) = proposed(recording, findings, asked) else { return Ok(None) };
+    let Some(scenario) = added(case, proposal.name())? else { return Ok(None) };
     let mut second = recorded(case, &scenario, case.seed.wrapping_add(1))?;
     "added".clone_into(&mut second.name);
     Ok(Some(diagnosed(case, &[recording.clone(), second], asked)?.1))
+}
+
+/// The manoeuvre that tells the rivals of the first finding that has some apart, if one does.
+fn proposed(recording: &Recording, findings: &Findings, asked: &DiagnoseOptions) -> Option<ManoeuvreKind> {
+    let best =
+        findings.findings.iter().find_map(|own| proposals(recording, own, asked))?.into_iter().next()?;
+    (best.ratio_per_minute > LEAST_RATIO).then_some(best.manoeuvre)
 }
 
 fn line(index: usize, of: usize, result: &CaseResult) -> String {

@@ -224,6 +224,7 @@ pub fn word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Named => "named",
         Verdict::CannotTell => "cannot_tell",
+        Verdict::Form => "form",
         Verdict::Unnameable => "unnameable",
         Verdict::BadData => "bad_data",
         Verdict::NothingMissing => "nothing_missing",

@@ -47,6 +47,7 @@ fn finding(set: &[&str], robots: &[u32], parameters: &[(&str, f64, [f64; 2])]) -
         place: Place::default(),
         p_familywise: 1e-9,
         held_out: HeldOut { log_score_gain: 50.0, log_score_gain_se: 5.0, rollout_rmse: Vec::new() },
+        shape: None,
         manoeuvre: None,
         summary: String::new(),
         equation: None,
