@@ -71,12 +71,11 @@ fn usual(all: &[Series]) -> (f64, f64) {
     (window_s, (0.5 * changes / pairs().count().max(1) as f64).sqrt())
 }
 
-/// The events of one unit in their order, with the channel of each that is read.
-fn events(
-    gyro: (&Series, f64),
-    truth: (&Series, f64),
-    first_s: f64,
-) -> Vec<(f64, Event, Option<(Channel, f64)>)> {
+/// When something happens, what, and the channel and time of the residual if one is read then.
+type Timed = (f64, Event, Option<(Channel, f64)>);
+
+/// The events of one unit in their order.
+fn events(gyro: (&Series, f64), truth: (&Series, f64), first_s: f64) -> Vec<Timed> {
     let mut all = Vec::new();
     let mut of_channel = |(rows, window_s): (&Series, f64), channel: Channel| {
         let mut before: Option<f64> = None;
@@ -115,9 +114,8 @@ pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family
         return Some(quick);
     }
     // References that come from gyro and encoders themselves say nothing of either.
-    let truth = |unit: &&Unit<'_>| match unit.evidence.is_by_reference() {
-        true => Series::new(),
-        false => series(unit, &terms, Channel::Body, YAW),
+    let truth = |unit: &&Unit<'_>| {
+        if unit.evidence.is_by_reference() { Series::new() } else { series(unit, &terms, Channel::Body, YAW) }
     };
     let truth: Vec<Series> = units.iter().map(truth).collect();
     let mut whole = of_series(units, &gyro, &truth, true)?;

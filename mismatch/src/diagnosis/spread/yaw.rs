@@ -286,6 +286,8 @@ mod tests {
             slip * sum * lengths / f64::from(pieces * pieces) + spread * overlap
         };
         let window = |row: usize| if row < 4 { gyro[row] } else { truth[row - 4] };
+        let meets =
+            |of: (f64, f64), with: (f64, f64)| (of.1 - with.0).abs() < 1e-9 || (with.1 - of.0).abs() < 1e-9;
         let covariance = DMatrix::from_fn(7, 7, |a, b| {
             let (i, j) = (ended[a], ended[b]);
             let per_s = |row: usize| if row < 4 { 2.0 } else { 1.0 };
@@ -296,7 +298,7 @@ mod tests {
             }
             if i == j {
                 sum += if i < 4 { sigma * sigma + 2.0 * edge } else { turned + 2.0 * heading };
-            } else if (i < 4) == (j < 4) && (of.1 == with.0 || with.1 == of.0) {
+            } else if (i < 4) == (j < 4) && meets(of, with) {
                 sum -= if i < 4 { edge } else { heading };
             }
             sum
