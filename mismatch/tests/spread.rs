@@ -11,7 +11,7 @@ mod common;
 
 use common::recorded;
 use pleiad_estimation::sample::{Reading, Target};
-use pleiad_estimation::{LandmarkId, RobotId};
+use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use pleiad_mismatch::{DiagnoseOptions, Finding, Verdict, diagnose};
 use pleiad_physics::Effect;
 use pleiad_recording::Recording;
@@ -98,11 +98,9 @@ fn wrong_names_of_which_a_scan_keeps_one_have_the_same_probability() {
     assert!(low < share && share < high, "{found:?} for {share}");
 }
 
-#[test]
-fn a_walk_added_to_the_gyro_is_found_and_named_no_bias() {
-    let mut recording = recorded(None);
+/// Adds a walk of this density to the gyro.
+fn walking(recording: &mut Recording, density: f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(6);
-    let density = 5e-4;
     let mut bias = 0.0;
     for sample in &mut recording.robots.get_mut(&RobotId(1)).unwrap().gyro {
         let normal: f64 = StandardNormal.sample(&mut rng);
@@ -111,6 +109,72 @@ fn a_walk_added_to_the_gyro_is_found_and_named_no_bias() {
             *yaw_rate_rad_s += bias;
         }
     }
+}
+
+#[test]
+fn a_walk_added_to_the_gyro_is_found_and_named_no_bias() {
+    let mut recording = recorded(None);
+    let density = 5e-4;
+    walking(&mut recording, density);
+    let finding = only_finding(recording);
+    assert_eq!(finding.effect.as_deref(), Some("gyro_random_walk"));
+    let [low, high] = finding.parameters["rad_s_sqrt_s"].ci95;
+    assert!(low < density && density < high, "{:?}", finding.parameters);
+}
+
+/// Lets the body turn beside its wheels by a process that forgets in 2 s: gyro and truth show it alike.
+fn slipping(recording: &mut Recording, seed: u64) {
+    let (sigma_rad_s, constant_s, step_s) = (0.001, 2.0_f64, 0.001);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let kept = (-step_s / constant_s).exp();
+    // Rate and angle at every millisecond.
+    let mut slips = vec![(0.0, 0.0)];
+    for _ in 0..130_000 {
+        let normal: f64 = StandardNormal.sample(&mut rng);
+        let (rate, angle) = slips[slips.len() - 1];
+        slips.push((kept * rate + sigma_rad_s * (1.0 - kept * kept).sqrt() * normal, angle + step_s * rate));
+    }
+    let at = |seconds: f64| slips[(seconds / step_s).round() as usize];
+    let own = recording.robots.get_mut(&RobotId(1)).unwrap();
+    for sample in &mut own.gyro {
+        if let Reading::Gyro { yaw_rate_rad_s } = &mut sample.reading {
+            *yaw_rate_rad_s += at(sample.time.seconds()).0;
+        }
+    }
+    // Every step of the path is turned by what was slipped before it.
+    let old: Vec<Pose2> = own.truth.iter().map(|sample| sample.pose).collect();
+    let (mut x_m, mut y_m) = (old[0].x_m(), old[0].y_m());
+    for (index, sample) in own.truth.iter_mut().enumerate() {
+        let angle = at(sample.time.seconds()).1;
+        if index > 0 {
+            let (dx, dy) = (old[index].x_m() - old[index - 1].x_m(), old[index].y_m() - old[index - 1].y_m());
+            x_m += angle.cos() * dx - angle.sin() * dy;
+            y_m += angle.sin() * dx + angle.cos() * dy;
+        }
+        sample.pose = Pose2::new(x_m, y_m, old[index].yaw_rad() + angle);
+    }
+    // What depends on where the robot is would have to be measured anew.
+    own.sightings.clear();
+    own.gps.clear();
+    own.heading.clear();
+}
+
+#[test]
+fn slip_that_lasts_is_no_walk_of_the_gyro() {
+    for seed in 10..14 {
+        let mut recording = recorded(None);
+        slipping(&mut recording, seed);
+        let findings = diagnose(&[recording], &DiagnoseOptions::default()).unwrap().findings;
+        assert_eq!(findings.verdict, Verdict::NothingMissing, "{seed}: {:?}", findings.findings);
+    }
+}
+
+#[test]
+fn a_walk_is_found_beside_slip_that_lasts() {
+    let mut recording = recorded(None);
+    slipping(&mut recording, 10);
+    let density = 1.5e-3;
+    walking(&mut recording, density);
     let finding = only_finding(recording);
     assert_eq!(finding.effect.as_deref(), Some("gyro_random_walk"));
     let [low, high] = finding.parameters["rad_s_sqrt_s"].ci95;

@@ -255,7 +255,10 @@ impl Family<'_, '_> {
 
     fn shows(&self, member: usize, active: &[usize], with: &Optimum, tests: usize) -> Option<Shows> {
         let others: Vec<usize> = active.iter().copied().filter(|other| *other != member).collect();
-        let without = self.fit(&others, with, &|_| true);
+        // Noise that was fitted beside the member may be far from what explains the most without it.
+        let without = [with, &self.nothing()].map(|from| self.fit(&others, from, &|_| true));
+        let without =
+            without.into_iter().reduce(|a, b| if b.log_likelihood > a.log_likelihood { b } else { a })?;
         let (p, inflation) = self.significance(active, member, with, &without);
         if p * tests as f64 >= FAMILYWISE {
             return None;

@@ -49,11 +49,13 @@ pub(super) fn estimated(member: &Member, robot: RobotId, with: &Optimum, known: 
     Estimated { term, errors, profiled: Vec::new() }
 }
 
-/// The channel of an effect that shows in rows of this one: a row of sightings goes by its range.
+/// The channel of an effect that shows in rows of this one: a row of sightings goes by its range, and truth only
+/// tells what of the gyro is slip.
 fn channel(effect: Effect, of_rows: Channel) -> Channel {
     match (effect, of_rows) {
         (Effect::MotionBlur, Channel::RangeToLandmark) => Channel::BearingToLandmark,
         (Effect::MotionBlur, Channel::RangeToRobot) => Channel::BearingToRobot,
+        (Effect::GyroRandomWalk, Channel::Body) => Channel::Gyro,
         _ => of_rows,
     }
 }

@@ -1,7 +1,7 @@
 //! Maximum likelihood of a few parameters on many rows, whatever their densities: quasi-Newton ascent
 //! (`nocedal2006`, BFGS) within bounds, begun with the outer product of the rows' scores for a curvature.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::diagnosis::white::raised;
 
@@ -15,6 +15,8 @@ const SHORTEST: f64 = 1e-6;
 const LEAST_GAIN: f64 = 1e-4;
 /// The diagonal is raised by this share.
 const RIDGE: f64 = 1e-9;
+/// The least curvature, over the sum of the squares of the scores.
+const FLATTEST: f64 = 1e-3;
 /// Finite differences, as a share of a parameter's scale.
 const SHARE: f64 = 1e-4;
 
@@ -188,11 +190,17 @@ pub(super) fn uncertainty(
         value > own.low && value < own.high
     };
     let free: Vec<usize> = free.iter().copied().filter(inside).collect();
+    let all = |_: usize| true;
+    // What no row depends on, as the time constant of what vanishes, is not known and moves nothing.
+    let scores = scores_at(density, bounds, parameters, &free, &all);
+    let shown = |own: &usize| scores[*own].iter().any(|score| *score != 0.0);
+    let shown: Vec<usize> = (0..free.len()).filter(shown).collect();
+    let (free, scores): (Vec<usize>, Vec<Vec<f64>>) =
+        shown.iter().map(|&own| (free[own], scores[own].clone())).unzip();
     let size = free.len();
     if size == 0 {
         return None;
     }
-    let all = |_: usize| true;
     let mut curvature = DMatrix::zeros(size, size);
     for (column, &index) in free.iter().enumerate() {
         let reach = reach(parameters[index], &bounds[index]) * 10.0;
@@ -207,7 +215,6 @@ pub(super) fn uncertainty(
         }
     }
     curvature = 0.5 * (&curvature + curvature.transpose());
-    let scores = scores_at(density, bounds, parameters, &free, &all);
     let blocks = density.blocks();
     let count = blocks.iter().max().map_or(0, |last| last + 1);
     let mut sums: DMatrix<f64> = DMatrix::zeros(size, count);
@@ -216,10 +223,30 @@ pub(super) fn uncertainty(
             sums[(position, block)] += scores[position][row];
         }
     }
+    let curvature = positive(curvature, &scores)?;
     let (meat, _) = raised(&(&sums * sums.transpose()), &curvature, 1.0)?;
     let naive = curvature.cholesky()?.inverse();
     let covariance = &naive * meat * &naive;
     covariance.iter().all(|value| value.is_finite()).then_some(Uncertainty { free, covariance, naive })
+}
+
+/// A curvature that is positive in every direction: where rows say next to nothing it may bend the wrong way. Its
+/// eigenvalues, over the sums of the squares of the scores, are at least [`FLATTEST`].
+fn positive(curvature: DMatrix<f64>, scores: &[Vec<f64>]) -> Option<DMatrix<f64>> {
+    if curvature.clone().cholesky().is_some() {
+        return Some(curvature);
+    }
+    let size = curvature.nrows();
+    let scale: Vec<f64> =
+        scores.iter().map(|own| own.iter().map(|score| score * score).sum::<f64>().sqrt()).collect();
+    let scaled = DMatrix::from_fn(size, size, |i, j| curvature[(i, j)] / scale[i] / scale[j]);
+    if !scaled.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    let eigen = SymmetricEigen::new(scaled);
+    let raised = DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| value.max(FLATTEST)));
+    let whole = &eigen.eigenvectors * raised * eigen.eigenvectors.transpose();
+    Some(DMatrix::from_fn(size, size, |i, j| whole[(i, j)] * scale[i] * scale[j]))
 }
 
 /// What would be known of parameters, by the outer product of the scores of rows: each has the mean zero given
@@ -322,73 +349,4 @@ fn clamp(parameters: &mut [f64], bounds: &[Bounds], free: &[usize]) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Errors of mean `m` and logarithm of sigma `l`, and a third parameter that pulls below its bound.
-    struct Normal {
-        errors: Vec<f64>,
-        blocks: Vec<usize>,
-    }
-
-    impl Density for Normal {
-        fn rows(&self) -> usize {
-            self.errors.len()
-        }
-
-        fn blocks(&self) -> &[usize] {
-            &self.blocks
-        }
-
-        fn fill(&self, parameters: &[f64], into: &mut [f64]) {
-            for (error, value) in self.errors.iter().zip(into) {
-                let z = (error - parameters[0]) * libm::exp(-parameters[1]);
-                *value = -0.5 * z * z - parameters[1] - parameters[2];
-            }
-        }
-    }
-
-    const BOUNDS: [Bounds; 3] = [
-        Bounds { low: -100.0, high: 100.0, scale: 1.0 },
-        Bounds { low: -20.0, high: 20.0, scale: 0.1 },
-        Bounds { low: 0.0, high: 1.0, scale: 0.1 },
-    ];
-
-    /// Symmetric about 3, so that mean and spread are closed forms.
-    fn normal(per_block: usize) -> Normal {
-        let errors: Vec<f64> = (0..400).map(|index| 3.0 + 0.01 * (f64::from(index) - 199.5)).collect();
-        let blocks = (0..400).map(|index| index / per_block).collect();
-        Normal { errors, blocks }
-    }
-
-    #[test]
-    fn mean_and_spread_are_found_from_afar_and_a_bound_holds() {
-        let normal = normal(1);
-        let variance = 1e-4 * (400.0_f64 * 400.0 - 1.0) / 12.0;
-        for start in [[0.0, 3.0, 0.5], [-5.0, -1.0, 0.0], [3.0, -6.0, 0.0]] {
-            let found = maximize(&normal, &BOUNDS, &start, &[0, 1, 2], &|_| true);
-            assert!((found.parameters[0] - 3.0).abs() < 1e-3, "{found:?}");
-            assert!((found.parameters[1] - 0.5 * variance.ln()).abs() < 1e-3, "{found:?}");
-            assert!(found.parameters[2].abs() < 1e-12);
-            let expected = -400.0 * (0.5 + 0.5 * variance.ln());
-            assert!((found.log_likelihood - expected).abs() < 1e-3);
-        }
-        let half = maximize(&normal, &BOUNDS, &[0.0; 3], &[0, 1], &|row| row < 200);
-        assert!((half.parameters[0] - 2.0).abs() < 1e-2, "rows that are not kept say nothing");
-    }
-
-    #[test]
-    fn errors_are_those_of_means_and_grow_where_blocks_hang_together() {
-        let [alone, together] = [1, 50].map(|per_block| {
-            let normal = normal(per_block);
-            let found = maximize(&normal, &BOUNDS, &[0.0; 3], &[0, 1], &|_| true);
-            let known = uncertainty(&normal, &BOUNDS, &found, &[0, 1]).unwrap();
-            (known.between(0, 0).unwrap(), known.inflation(&[0]))
-        });
-        let variance = 1e-4 * (400.0_f64 * 400.0 - 1.0) / 12.0;
-        assert!((alone.0 / (variance / 400.0) - 1.0).abs() < 1e-3, "{alone:?}");
-        // Blocks of 50 neighbours are nearly all of one sign: 50 times the variance, less what varies within.
-        assert!((together.1 - 50.0).abs() < 1.0 && alone.1 < 1.001, "{together:?}");
-        assert!((together.0 / alone.0 - 50.0).abs() < 1.0);
-    }
-}
+mod tests;

@@ -21,6 +21,7 @@ mod sighted;
 mod swap;
 mod ticks;
 mod walk;
+mod yaw;
 
 use std::collections::BTreeSet;
 
@@ -33,7 +34,7 @@ use crate::diagnosis::held_out::Gain;
 use crate::diagnosis::naming::Judged;
 use crate::diagnosis::select::Entry;
 use crate::diagnosis::spread::family::{Family, Shows};
-use crate::diagnosis::term::Whose;
+use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::findings::{Undetected, Untestable};
 use crate::parallel;
@@ -96,6 +97,8 @@ pub(crate) struct Spread {
     pub(crate) undetected: Vec<Undetected>,
     pub(crate) untestable: Vec<Untestable>,
     pub(crate) explained: Vec<Explained>,
+    /// Terms of the mean, by their positions in the fit, with an effect of spread that would do as well.
+    pub(crate) rivals: Vec<(usize, Effect)>,
 }
 
 /// A term of the mean of which an effect of spread explains a part, or all.
@@ -198,6 +201,7 @@ impl Spread {
         self.undetected.extend(other.undetected);
         self.untestable.extend(other.untestable);
         self.explained.extend(other.explained);
+        self.rivals.extend(other.rivals);
     }
 }
 
@@ -226,6 +230,7 @@ fn of_family(
         }
     }
     own.explained = explained(family, &shows, &own.terms, fit);
+    own.rivals = rivals(family, &shows, fit, robot);
     own.undetected.retain(|undetected| EFFECTS.iter().any(|effect| effect.name() == undetected.effect));
     own
 }
@@ -246,6 +251,19 @@ fn explained(family: &Family<'_, '_>, shows: &[Shows], terms: &[SpreadTerm], fit
                 all.extend(executed::explained(family, shows, effect, fit));
             }
             _ => {}
+        }
+    }
+    all
+}
+
+/// Effects of spread that would do as well as what a family shows of the mean.
+fn rivals(family: &Family<'_, '_>, shows: &[Shows], fit: &Fit, robot: RobotId) -> Vec<(usize, Effect)> {
+    let mut all = Vec::new();
+    for shows in shows {
+        let effect = family.members[shows.member].effect;
+        let own = |(_, term): &(usize, &Term)| term.effect == effect && term.acts_on(robot);
+        for (position, _) in fit.terms.iter().enumerate().filter(own) {
+            all.extend(shows.rivals.iter().map(|&rival| (position, rival)));
         }
     }
     all

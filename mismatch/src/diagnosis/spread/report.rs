@@ -6,7 +6,8 @@ use crate::diagnosis::spread::{Explained, Spread, SpreadTerm};
 use crate::findings::{Finding, HeldOut, Verdict};
 
 impl Spread {
-    /// Takes from terms of the mean what an effect of spread explains of them; says so.
+    /// Takes from terms of the mean what an effect of spread explains of them, and gives them the rivals that only
+    /// this stage knows; says so.
     pub(crate) fn explain(&self, judgements: &mut [Judgement], notes: &mut Vec<String>) {
         for &Explained { position, by, part } in &self.explained {
             for own in judgements.iter_mut().filter(|own| own.group.contains(&position)) {
@@ -18,6 +19,14 @@ impl Spread {
                 } else {
                     notes.push(format!("{name} is no finding: it is what {} does to the mean", by.name()));
                     own.judged.verdict = None;
+                }
+            }
+        }
+        for &(position, rival) in &self.rivals {
+            for own in judgements.iter_mut().filter(|own| own.group.contains(&position)) {
+                if own.judged.verdict.is_some() && !own.support.members.contains(&rival) {
+                    own.support.members.push(rival);
+                    own.judged.verdict = Some(Verdict::CannotTell);
                 }
             }
         }
