@@ -155,6 +155,9 @@ fn settings(
     let rate = |samples: usize| samples as f64 / duration_s(recording).max(1.0);
     let noise = &nominal.noise;
     let sensor = &nominal.range_sensor;
+    // What is declared of a sensor that is not there is zero; the scenario wants something.
+    let or = |declared: f64, usual: f64| if declared > 0.0 { declared } else { usual };
+    let usual = RobotSettings::default();
     let fastest = |of: fn(&pleiad_recording::Command) -> f64, least: f64| {
         recorded.commands.iter().map(of).fold(least, |most, value| most.max(value.abs()))
     };
@@ -174,6 +177,7 @@ fn settings(
         motion: Motion {
             policy: Policy::Manoeuvres,
             speed_m_s: fastest(|own| own.forward_m_s, 0.2),
+            min_speed_m_s: 0.1,
             max_yaw_rate_rad_s: fastest(|own| own.yaw_rate_rad_s, 0.3),
             ..Motion::default()
         },
@@ -190,17 +194,17 @@ fn settings(
         },
         gyro: Gyro {
             rate_hz: rate(recorded.gyro.len()).round(),
-            sigma_rad_s: noise.gyro_sigma_rad_s,
+            sigma_rad_s: or(noise.gyro_sigma_rad_s, usual.gyro.sigma_rad_s),
             bias_rad_s: 0.0,
         },
         gps: Gps {
             rate_hz: rate(recorded.gps.len()).round(),
-            sigma_m: noise.gps_sigma_m,
+            sigma_m: or(noise.gps_sigma_m, usual.gps.sigma_m),
             windows_s: Vec::new(),
         },
         heading: Heading {
             rate_hz: rate(recorded.heading.len()).round(),
-            sigma_rad: noise.heading_sigma_rad,
+            sigma_rad: or(noise.heading_sigma_rad, usual.heading.sigma_rad),
         },
         relative: RelativeSensor {
             rate_hz: if sees { 5.0 } else { 0.0 },
@@ -208,8 +212,8 @@ fn settings(
             min_range_m: sensor.min_range_m,
             max_range_m: sensor.max_range_m,
             half_fov_rad: sensor.half_fov_rad,
-            sigma_range_m: noise.range_sigma_m,
-            sigma_bearing_rad: noise.bearing_sigma_rad,
+            sigma_range_m: or(noise.range_sigma_m, usual.relative.sigma_range_m),
+            sigma_bearing_rad: or(noise.bearing_sigma_rad, usual.relative.sigma_bearing_rad),
             ..RelativeSensor::default()
         },
         ..RobotSettings::default()
