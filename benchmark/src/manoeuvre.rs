@@ -118,7 +118,7 @@ fn scenario(recording: &Recording, robot: RobotId, effect: ActiveEffect<f64>) ->
         }
         let mut own = settings(recording, nominal, id, declared)?;
         if id == robot {
-            own.effects.push(effect.clone());
+            own.effects.push(effect);
         }
         robots.insert(id, own);
     }
