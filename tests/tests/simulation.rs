@@ -2,6 +2,7 @@
 //! the ledger checked on the way. A seed that fails is replayed by the `schedules` example.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+#![allow(clippy::unreadable_literal, reason = "seeds are names")]
 
 use pleiad_sim_peers::simulation::{Options, Outcome, run};
 
