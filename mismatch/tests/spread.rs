@@ -134,6 +134,7 @@ fn slipping(recording: &mut Recording, seed: u64) {
         let (rate, angle) = slips[slips.len() - 1];
         slips.push((kept * rate + sigma_rad_s * (1.0 - kept * kept).sqrt() * normal, angle + step_s * rate));
     }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small position")]
     let at = |seconds: f64| slips[(seconds / step_s).round() as usize];
     let own = recording.robots.get_mut(&RobotId(1)).unwrap();
     for sample in &mut own.gyro {
