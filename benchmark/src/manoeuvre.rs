@@ -260,8 +260,17 @@ mod tests {
             |kind: ManoeuvreKind| found.iter().find(|own| own.manoeuvre == kind).unwrap().ratio_per_minute;
         // A scale changes its sign with the turn, a bias does not.
         assert!(of(ManoeuvreKind::Turn) > 30.0, "{found:?}");
-        assert!(found[0].ratio_per_minute >= of(ManoeuvreKind::Turn));
         assert!(advice(&found, "").contains(found[0].manoeuvre.name()));
+    }
+
+    #[test]
+    fn what_is_the_same_is_told_apart_by_nothing() {
+        let best = ActiveEffect::new(Effect::GyroScale, &[0.03]).unwrap();
+        let rivals = [Effect::GyroScale];
+        let found = tell_apart(&recording(), RobotId(1), best, &rivals, &DiagnoseOptions::default()).unwrap();
+        assert_eq!(found.len(), ManoeuvreKind::ALL.len());
+        assert!(found.iter().all(|own| own.ratio_per_minute < 1e-9), "{found:?}");
+        assert!(advice(&found, "a compass").starts_with("no manoeuvre"));
     }
 
     #[test]

@@ -217,8 +217,8 @@ fn with_manoeuvre(
     findings: &Findings,
     asked: &DiagnoseOptions,
 ) -> Result<Option<Scored>, BenchmarkError> {
-    let Some(proposal) = proposed(recording, findings, asked) else { return Ok(None) };
-    let Some(scenario) = added(case, proposal.name())? else { return Ok(None) };
+    let Some(manoeuvre) = proposed(recording, findings, asked) else { return Ok(None) };
+    let scenario = added(case, manoeuvre)?;
     let mut second = recorded(case, &scenario, case.seed.wrapping_add(1))?;
     "added".clone_into(&mut second.name);
     Ok(Some(diagnosed(case, &[recording.clone(), second], asked)?.1))

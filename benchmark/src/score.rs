@@ -28,8 +28,6 @@ pub struct Scored {
     pub evidence: f64,
     /// The largest gain on data left out of any finding, in standard errors; 0 without findings.
     pub gain_z: f64,
-    /// The manoeuvre that is proposed first.
-    pub manoeuvre: Option<String>,
     /// How long it took, seconds.
     pub seconds: f64,
 }
@@ -97,7 +95,6 @@ pub fn score(answer: &Answer, findings: &Findings, seconds: f64) -> Scored {
         nameless: findings.findings.iter().filter(|own| own.effect.is_none()).map(told).collect(),
         evidence: most(&evidence),
         gain_z: most(&gain_z),
-        manoeuvre: findings.findings.iter().find_map(|own| own.manoeuvre.clone()),
         seconds,
     }
 }

@@ -62,8 +62,8 @@ pub struct Without {
 /// Compares, locates, names, models.
 ///
 /// # Errors
-/// There is no recording to fit on; a recording has no nominal model, or one that lacks a robot; ground truth
-/// is not to be used.
+/// There is no recording to fit on; a recording has no nominal model, or one that lacks a robot; without
+/// ground truth nobody knows where a robot began, or a prediction is no finite number.
 pub fn diagnose(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Diagnosis, MismatchError> {
     diagnosis::run(recordings, options)
 }

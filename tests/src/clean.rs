@@ -8,6 +8,7 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 use std::time::Instant;
 
+use pleiad_benchmark::clopper_pearson;
 use pleiad_estimation::RobotId;
 use pleiad_mismatch::{DiagnoseOptions, Finding, diagnose};
 use pleiad_sim_peers::{Scenario, simulate};
@@ -118,40 +119,6 @@ pub fn told(finding: &Finding) -> String {
     )
 }
 
-/// The 95 % interval of a probability that was seen `count` times in `of` (Clopper and Pearson).
-#[must_use]
-pub fn interval(count: usize, of: usize) -> [f64; 2] {
-    // Where the chance of at least as many, or of at most as many, is 2.5 %.
-    let low = bisected(|p| at_most(count.wrapping_sub(1), of, p) > 0.975);
-    let high = bisected(|p| at_most(count, of, p) > 0.025);
-    [if count == 0 { 0.0 } else { low }, if count == of { 1.0 } else { high }]
-}
-
-/// The greatest probability for which it holds.
-fn bisected(holds: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if holds(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
-}
-
-/// The chance of at most `count` of `of` with probability `p` each.
-fn at_most(count: usize, of: usize, p: f64) -> f64 {
-    let mut term = (1.0 - p).powf(of as f64);
-    let mut sum = term;
-    for index in 1..=count.min(of) {
-        term *= (of - index + 1) as f64 / index as f64 * p / (1.0 - p);
-        sum += term;
-    }
-    sum
-}
-
 /// The table of groups, and below it every finding.
 #[must_use]
 pub fn table(groups: &[(&Group, Vec<Said>)]) -> String {
@@ -185,7 +152,7 @@ pub fn table(groups: &[(&Group, Vec<Said>)]) -> String {
     }
     let count: usize = groups.iter().map(|(_, said)| wrong(said)).sum();
     let of: usize = groups.iter().map(|(_, said)| said.len()).sum();
-    let [low, high] = interval(count, of).map(|share| 100.0 * share);
+    let [low, high] = clopper_pearson(count, of).map(|share| 100.0 * share);
     let _ = writeln!(
         text,
         "\nWith a finding: {count} of {of}; 95 % interval of the rate {low:.1} to {high:.1} % (Clopper and Pearson)."
@@ -199,25 +166,4 @@ pub fn table(groups: &[(&Group, Vec<Said>)]) -> String {
 
 fn wrong(said: &[Said]) -> usize {
     said.iter().filter(|own| !own.findings.is_empty()).count()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn intervals_are_those_of_published_tables() {
-        // 0 of n: 1 - 0.025^(1/n); the rest from R's binom.test.
-        let cases = [
-            ((0, 100), [0.0, 1.0 - 0.025_f64.powf(0.01)]),
-            ((2, 100), [0.002_431_337, 0.070_383_932]),
-            ((5, 10), [0.187_086, 0.812_914]),
-            ((3, 3), [0.025_f64.powf(1.0 / 3.0), 1.0]),
-        ];
-        for ((count, of), expected) in cases {
-            for (end, expected) in interval(count, of).into_iter().zip(expected) {
-                assert!((end - expected).abs() < 1e-6, "{count} of {of}: {end}, not {expected}");
-            }
-        }
-    }
 }

@@ -182,7 +182,7 @@ fn of_class(rows: &mut Rows<'_>, cases: &[&CaseResult]) {
             let seen = || cases.iter().filter(|own| own.oracle.effects.iter().all(|known| known.detectable));
             let said = |own: &CaseResult| own.tool.verdict == "cannot_tell";
             rows.share(TOOL, "cannot_tell, of detectable", seen().map(|own| said(own)));
-            let proposed = |own: &CaseResult| own.tool.manoeuvre.is_some();
+            let proposed = |own: &CaseResult| own.added.is_some();
             rows.share(TOOL, "a manoeuvre is proposed, of detectable", seen().map(|own| proposed(own)));
             let named = cases.iter().filter_map(|own| own.added.as_ref());
             let named = named.map(|own| !own.matches.is_empty() && own.matches.iter().all(|one| one.top1));

@@ -5,17 +5,15 @@ use pleiad_estimation::RobotId;
 use pleiad_physics::Effect;
 use pleiad_recording::Recording;
 
-use crate::builtin;
 use crate::diagnosis::candidate::candidates;
 use crate::diagnosis::entries::entries;
 use crate::diagnosis::fit::{Effort, fit};
-use crate::diagnosis::run::{Prepared, unit};
+use crate::diagnosis::run::Prepared;
 use crate::diagnosis::select::{Scored, score, whites};
 use crate::diagnosis::spread::is_of_spread;
 use crate::diagnosis::term::Whose;
 use crate::diagnosis::unit::Unit;
 use crate::error::MismatchError;
-use crate::evidence::Evidence;
 use crate::parallel;
 
 /// A linear regression of residuals on effects.
@@ -50,11 +48,8 @@ pub struct DesignColumn {
 /// # Errors
 /// As [`fit_known`](crate::fit_known).
 pub fn design(recording: &Recording, leave_out: &[Effect]) -> Result<Design, MismatchError> {
-    let models = builtin::models(recording)?;
-    let evidence = Evidence::new(recording, &models);
-    let prepared = Prepared { recording, evidence, models, tested: false };
-    let all: Vec<Unit<'_>> =
-        prepared.models.iter().map(|(&robot, model)| unit(0, &prepared, robot, model)).collect();
+    let prepared = Prepared::alone(recording, false)?;
+    let all = prepared.units(|_| true);
     let units: Vec<&Unit<'_>> = all.iter().filter(|unit| !unit.rows.is_empty()).collect();
     let Some(nominal) = fit(&units, Vec::new(), &|_| true, Effort::FULL) else {
         return Ok(Design::default());

@@ -7,7 +7,6 @@ use pleiad_estimation::RobotId;
 use pleiad_physics::Effect;
 use pleiad_recording::Recording;
 
-use crate::builtin;
 use crate::diagnosis::candidate::candidates;
 use crate::diagnosis::entries::{composition, entries, is_shared};
 use crate::diagnosis::fit::{Effort, Fit, fit};
@@ -15,14 +14,13 @@ use crate::diagnosis::held_out::cross_fitted;
 use crate::diagnosis::known::{KnownFit, found, of_mean_known};
 use crate::diagnosis::profile::polish;
 use crate::diagnosis::refine::refine;
-use crate::diagnosis::run::{Prepared, unit};
+use crate::diagnosis::run::Prepared;
 use crate::diagnosis::select::{Entry, Scored, fit_beside, score, whites};
 use crate::diagnosis::spread::is_of_spread;
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::step;
 use crate::error::MismatchError;
-use crate::evidence::Evidence;
 
 /// So many of the strongest rivals are fitted.
 const RIVALS: usize = 5;
@@ -66,11 +64,8 @@ pub struct Explained {
 /// # Errors
 /// As [`fit_known`](crate::fit_known).
 pub fn explained(recording: &Recording, structures: &[Structure]) -> Result<Vec<Explained>, MismatchError> {
-    let models = builtin::models(recording)?;
-    let evidence = Evidence::new(recording, &models);
-    let prepared = Prepared { recording, evidence, models, tested: false };
-    let all: Vec<Unit<'_>> =
-        prepared.models.iter().map(|(&robot, model)| unit(0, &prepared, robot, model)).collect();
+    let prepared = Prepared::alone(recording, false)?;
+    let all = prepared.units(|_| true);
     let units: Vec<&Unit<'_>> = all.iter().filter(|unit| !unit.rows.is_empty()).collect();
     let Some(nominal) = fit(&units, Vec::new(), &|_| true, Effort::FULL) else { return Ok(Vec::new()) };
     let each = structures.iter().enumerate();

@@ -9,7 +9,6 @@ use pleiad_estimation::RobotId;
 use pleiad_physics::{Effect, Fit as How};
 use pleiad_recording::Recording;
 
-use crate::builtin;
 use crate::diagnose::{DiagnoseOptions, TruthUse};
 use crate::diagnosis::candidate::candidates;
 use crate::diagnosis::entries::is_shared;
@@ -18,7 +17,7 @@ use crate::diagnosis::naming::{Estimated, Z_95, groups, total};
 use crate::diagnosis::profile::{Profile, polish};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::robust::{Robust, robust};
-use crate::diagnosis::run::{Prepared, member};
+use crate::diagnosis::run::Prepared;
 use crate::diagnosis::select::{Scored, fit_beside, score, whites};
 use crate::diagnosis::spread::{is_of_spread, known, known_swap};
 use crate::diagnosis::support::slack;
@@ -26,7 +25,6 @@ use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::diagnosis::without_truth::{teams, withheld_of};
 use crate::error::MismatchError;
-use crate::evidence::Evidence;
 use crate::findings::Estimate;
 
 /// So many of the strongest starts are fitted.
@@ -99,14 +97,9 @@ pub fn fit_known(
     robot: RobotId,
     effects: &[Effect],
 ) -> Result<Vec<KnownFit>, MismatchError> {
-    let models = builtin::models(recording)?;
-    let evidence = Evidence::new(recording, &models);
-    let prepared = Prepared { recording, evidence, models, tested: false };
+    let prepared = Prepared::alone(recording, false)?;
     let shared = effects.iter().any(|effect| is_shared(effect.info()));
-    let concerned = prepared.models.iter().filter(|(own, _)| shared || **own == robot);
-    let mut all: Vec<Unit<'_>> = concerned
-        .map(|(&own, model)| Unit::new(&prepared.evidence, 0, vec![member(recording, own, model)]))
-        .collect();
+    let mut all = prepared.units(|own| shared || own == robot);
     // Sightings under wrong names are put right before anything is fitted.
     let swapped = effects.contains(&Effect::LandmarkIdentitySwap).then(|| known_swap(&mut all)).flatten();
     let units: Vec<&Unit<'_>> = all.iter().filter(|unit| !unit.rows.is_empty()).collect();
@@ -152,19 +145,9 @@ pub fn log_likelihood(
     } else {
         recording
     };
-    let models = builtin::models(recording)?;
-    let evidence = if by_reference {
-        Evidence::by_reference(recording, &models)
-    } else {
-        Evidence::new(recording, &models)
-    };
-    let prepared = Prepared { recording, evidence, models, tested: false };
-    let alone = |(own, model): (&RobotId, &pleiad_physics::RobotModel<f64>)| {
-        Unit::new(&prepared.evidence, 0, vec![member(recording, *own, model)])
-    };
+    let prepared = Prepared::alone(recording, by_reference)?;
     let shared = effects.iter().any(|effect| is_shared(effect.info()));
-    let concerned = prepared.models.iter().filter(|(own, _)| shared || by_reference || **own == robot);
-    let all: Vec<Unit<'_>> = concerned.map(alone).collect();
+    let all = prepared.units(|own| shared || by_reference || own == robot);
     let joined = if by_reference { teams(&all, std::slice::from_ref(&prepared))? } else { Vec::new() };
     let units: Vec<&Unit<'_>> = if by_reference { &joined } else { &all }.iter().collect();
     let units: Vec<&Unit<'_>> = units.into_iter().filter(|unit| !unit.rows.is_empty()).collect();

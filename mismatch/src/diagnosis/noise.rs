@@ -124,7 +124,7 @@ impl Noise {
                     }
                 }
             }
-            filter.whiten_lanes(mesh, &mut lanes);
+            filter.whiten(mesh, &mut lanes);
             for (which, stretch) in unit.stretches.iter().enumerate() {
                 if !is_meshed(stretch.channel) || is_move(stretch.channel) || stretch.rows == 0 {
                     continue;

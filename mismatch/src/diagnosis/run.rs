@@ -63,13 +63,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let mut prepared = Vec::new();
     for (recording, role) in recordings.iter().zip(tested) {
         let Some(tested) = role else { continue };
-        let models = builtin::models(recording)?;
-        let evidence = if by_reference {
-            Evidence::by_reference(recording, &models)
-        } else {
-            Evidence::new(recording, &models)
-        };
-        prepared.push(Prepared { recording, evidence, models, tested });
+        prepared.push(Prepared { tested, ..Prepared::alone(recording, by_reference)? });
     }
     let mut all: Vec<Unit<'_>> = prepared
         .iter()
@@ -232,13 +226,30 @@ fn roles(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Vec<Opti
     Ok(roles)
 }
 
+impl<'a> Prepared<'a> {
+    /// A recording by itself, under the models that it declares.
+    ///
+    /// # Errors
+    /// The recording has no nominal model and its odometry is not of commands, or the model lacks a robot.
+    pub(crate) fn alone(recording: &'a Recording, by_reference: bool) -> Result<Self, MismatchError> {
+        let models = builtin::models(recording)?;
+        let evidence = if by_reference {
+            Evidence::by_reference(recording, &models)
+        } else {
+            Evidence::new(recording, &models)
+        };
+        Ok(Self { recording, evidence, models, tested: false })
+    }
+
+    /// The robots for which `wanted` holds, each by itself.
+    pub(crate) fn units(&'a self, wanted: impl Fn(RobotId) -> bool) -> Vec<Unit<'a>> {
+        let models = self.models.iter().filter(|(robot, _)| wanted(**robot));
+        models.map(|(&robot, model)| unit(0, self, robot, model)).collect()
+    }
+}
+
 /// A robot by itself.
-pub(crate) fn unit<'a>(
-    index: usize,
-    own: &'a Prepared<'a>,
-    robot: RobotId,
-    model: &RobotModel<f64>,
-) -> Unit<'a> {
+fn unit<'a>(index: usize, own: &'a Prepared<'a>, robot: RobotId, model: &RobotModel<f64>) -> Unit<'a> {
     Unit::new(&own.evidence, index, vec![member(own.recording, robot, model)])
 }
 

@@ -1,6 +1,5 @@
 //! Recordings without what they are not to be judged by, and teams whose places nobody knows but they.
 
-use pleiad_estimation::RobotId;
 use pleiad_estimation::sample::{Reading, Target};
 use pleiad_physics::Pose;
 use pleiad_recording::Recording;
@@ -51,7 +50,7 @@ fn referred(recording: &Recording) -> Result<Recording, MismatchError> {
         let evidence = Evidence::by_reference(&blind, &models);
         let members = models.iter().map(|(&robot, model)| member(&blind, robot, model)).collect();
         let unit = team(&evidence, 0, members, &recording.name)?;
-        let unknown = || no_mesh(&recording.name, unit.robot());
+        let unknown = || not_finite(&recording.name);
         let state = states(&[&unit], &[]).and_then(|mut states| states.pop()).ok_or_else(unknown)?;
         let moved = corrected(&unit, &state).ok_or_else(unknown)?;
         blind = moved;
@@ -119,8 +118,8 @@ pub(crate) fn at_own_references(units: &[&Unit<'_>], own: &Fit, noise: &[State])
     Some(fitted.log_likelihood)
 }
 
-fn no_mesh(recording: &str, robot: RobotId) -> MismatchError {
-    MismatchError::NoStart { recording: recording.to_owned(), robot }
+fn not_finite(recording: &str) -> MismatchError {
+    MismatchError::NotFinite { recording: recording.to_owned() }
 }
 
 /// Stamps in seconds, and poses.
@@ -166,9 +165,8 @@ fn team<'a>(
     members: Vec<Member>,
     name: &str,
 ) -> Result<Unit<'a>, MismatchError> {
-    let first = members.first().map_or(RobotId(0), |member| member.robot);
     let mut unit = Unit::new(evidence, index, members);
-    unit.mesh = Some(Mesh::new(&unit).ok_or_else(|| no_mesh(name, first))?);
+    unit.mesh = Some(Mesh::new(&unit).ok_or_else(|| not_finite(name))?);
     Ok(unit)
 }
 

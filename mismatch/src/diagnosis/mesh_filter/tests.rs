@@ -70,7 +70,7 @@ fn mesh() -> (Mesh, usize) {
 
 /// What the residuals of moves and the independent causes make of the states and readings: the matrix of the readings
 /// by moves' residuals, and the covariance of what is left.
-fn dense(mesh: &Mesh, elements: usize) -> (DMatrix<f64>, DMatrix<f64>, Vec<usize>) {
+fn dense(mesh: &Mesh, elements: usize) -> Dense {
     let lost = 3 * mesh.events.iter().filter(|event| matches!(event, Event::Lost(_))).count();
     let moves = mesh.events.iter().filter(|event| matches!(event, Event::Move(_))).count();
     let causes = mesh.size + lost + STATES * moves;
@@ -125,7 +125,29 @@ fn dense(mesh: &Mesh, elements: usize) -> (DMatrix<f64>, DMatrix<f64>, Vec<usize
     }
     let covariance =
         &by_cause * DMatrix::from_diagonal(&variance) * by_cause.transpose() + DMatrix::from_diagonal(&noise);
-    (by_element, covariance, order)
+    let ends = &states_by_cause * DMatrix::from_diagonal(&variance) * by_cause.transpose();
+    Dense { by_element, covariance, order, states_by_element, ends }
+}
+
+/// What readings and states are made of.
+struct Dense {
+    /// Readings by the residuals of moves.
+    by_element: DMatrix<f64>,
+    /// Of the readings.
+    covariance: DMatrix<f64>,
+    /// The element of each reading.
+    order: Vec<usize>,
+    /// States at the end by the residuals of moves.
+    states_by_element: DMatrix<f64>,
+    /// Covariance of the states at the end with the readings.
+    ends: DMatrix<f64>,
+}
+
+/// One lane.
+fn whitened(filter: &Filter, mesh: &Mesh, residuals: &[f64]) -> Vec<f64> {
+    let mut values: Vec<[f64; 1]> = residuals.iter().map(|value| [*value]).collect();
+    filter.whiten(mesh, &mut values);
+    values.into_iter().map(|[value]| value).collect()
 }
 
 fn residuals(elements: usize, size: f64) -> Vec<f64> {
@@ -134,24 +156,24 @@ fn residuals(elements: usize, size: f64) -> Vec<f64> {
 }
 
 /// What the readings are off by once moves are taken for as they were measured.
-fn left(mesh: &Mesh, residuals: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
-    let (by_element, covariance, order) = dense(mesh, residuals.len());
-    let own = DVector::from_iterator(order.len(), order.iter().map(|&element| residuals[element]));
-    (own - by_element * DVector::from_column_slice(residuals), covariance)
+fn left(mesh: &Mesh, residuals: &[f64]) -> (DVector<f64>, Dense) {
+    let dense = dense(mesh, residuals.len());
+    let own =
+        DVector::from_iterator(dense.order.len(), dense.order.iter().map(|&element| residuals[element]));
+    (own - &dense.by_element * DVector::from_column_slice(residuals), dense)
 }
 
 #[test]
 fn innovations_have_the_likelihood_of_the_whole_with_the_unknown_integrated_out() {
     let (mesh, elements) = mesh();
     let residuals = residuals(elements, 0.1);
-    let (left, covariance) = left(&mesh, &residuals);
+    let (left, Dense { covariance, .. }) = left(&mesh, &residuals);
     let factor = covariance.cholesky().unwrap();
     let expected_log: f64 = 2.0 * factor.l().diagonal().iter().map(|value| value.ln()).sum::<f64>();
     let expected = left.dot(&factor.solve(&left));
 
     let filter = Filter::new(&mesh, &SCALES, vec![1.0; mesh.reads]);
-    let mut whitened = residuals.clone();
-    filter.whiten(&mesh, &mut whitened);
+    let whitened = whitened(&filter, &mesh, &residuals);
     let log: f64 = -2.0 * filter.roots.iter().map(|root| root.ln()).sum::<f64>();
     let square: f64 = whitened.iter().map(|value| value * value).sum();
     assert!((log - expected_log).abs() < 1e-8 * expected_log.abs(), "{log} {expected_log}");
@@ -165,10 +187,9 @@ fn lanes_are_what_each_is_alone() {
     let columns: Vec<Vec<f64>> = (0..LANES).map(|lane| residuals(elements, 0.1 + lane as f64)).collect();
     let mut together: Vec<[f64; LANES]> =
         (0..elements).map(|element| std::array::from_fn(|lane| columns[lane][element])).collect();
-    filter.whiten_lanes(&mesh, &mut together);
+    filter.whiten(&mesh, &mut together);
     for (lane, column) in columns.into_iter().enumerate() {
-        let mut alone = column;
-        filter.whiten(&mesh, &mut alone);
+        let alone = whitened(&filter, &mesh, &column);
         for (value, together) in alone.iter().zip(&together) {
             assert!((value - together[lane]).abs() < 1e-9 * (1.0 + value.abs()));
         }
@@ -180,9 +201,9 @@ fn small_residuals_are_linear_and_large_ones_are_not() {
     let (mesh, elements) = mesh();
     let filter = Filter::new(&mesh, &SCALES, vec![1.0; mesh.reads]);
     let apart = |size: f64| {
-        let (mut exact, mut linear) = (residuals(elements, size), residuals(elements, size));
+        let mut exact = residuals(elements, size);
+        let linear = whitened(&filter, &mesh, &exact);
         filter.innovate(&mesh, &mut exact);
-        filter.whiten(&mesh, &mut linear);
         exact.iter().zip(&linear).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     let (small, tenfold) = (apart(1e-4), apart(1e-3));
@@ -191,10 +212,10 @@ fn small_residuals_are_linear_and_large_ones_are_not() {
 }
 
 #[test]
-fn references_are_put_where_the_whole_says() {
+fn references_begin_and_end_where_the_whole_says() {
     let (mesh, elements) = mesh();
     let residuals = residuals(elements, 0.1);
-    let (left, covariance) = left(&mesh, &residuals);
+    let (left, Dense { covariance, states_by_element, ends, .. }) = left(&mesh, &residuals);
     // The beginning given everything: its covariance with the readings, through their inverse.
     let mut begun: DMatrix<f64> = DMatrix::zeros(mesh.reads, mesh.size);
     let mut reading = 0;
@@ -208,14 +229,18 @@ fn references_are_put_where_the_whole_says() {
         }
         reading += 1;
     }
-    let expected = begun.transpose() * covariance.cholesky().unwrap().solve(&left);
+    let solved = covariance.cholesky().unwrap().solve(&left);
+    let expected = begun.transpose() * &solved;
+    let expected_end = states_by_element * DVector::from_column_slice(&residuals) + ends * solved;
     let filter = Filter::new(&mesh, &SCALES, vec![1.0; mesh.reads]);
     let found = filter.smoothed(&mesh, &SCALES, &residuals);
     for robot in 0..2 {
         assert_eq!(found[robot].len(), 7);
         for offset in 0..STATES {
-            let (value, wanted) = (found[robot][0][offset], expected[STATES * robot + offset]);
-            assert!((value - wanted).abs() < 1e-8 * (1.0 + wanted.abs()), "{value} {wanted}");
+            for (place, expected) in [(0, &expected), (6, &expected_end)] {
+                let (value, wanted) = (found[robot][place][offset], expected[STATES * robot + offset]);
+                assert!((value - wanted).abs() < 1e-8 * (1.0 + wanted.abs()), "{place}: {value} {wanted}");
+            }
         }
     }
 }
@@ -229,8 +254,7 @@ fn noise_is_estimated_where_its_likelihood_is_greatest() {
     assert!(filter.weights.iter().all(|weight| (*weight - 1.0).abs() < 1e-12), "none is wild");
     let cost = |scales: &[f64]| {
         let filter = Filter::new(&mesh, scales, vec![1.0; mesh.reads]);
-        let mut whitened = residuals.clone();
-        filter.whiten(&mesh, &mut whitened);
+        let whitened = whitened(&filter, &mesh, &residuals);
         let log: f64 = -filter.roots.iter().map(|root| root.ln()).sum::<f64>();
         log + 0.5 * whitened.iter().map(|value| value * value).sum::<f64>()
     };
