@@ -105,12 +105,8 @@ fn what_was_fitted_on_one_dataset_predicts_headings_of_the_other_a_tenth_better_
     assert!(position.mean >= 0.0, "{position:?}");
 }
 
-/// What is named with commands of another time and not shown with the right ones, though nothing should be: its gain
-/// is near the limit. If it is gone, this has to go too.
-const NEW: (u32, &str) = (4, "heavy_tails");
-
 #[test]
-fn commands_that_belong_to_another_time_claim_nothing_of_the_motion_and_name_one_thing_that_is_new() {
+fn commands_that_belong_to_another_time_claim_nothing_of_the_motion_and_name_nothing_new() {
     let known = shown(&diagnoses()[0]);
     let motion = ["actuator_lag", "command_delay", "actuator_gain", "turn_loss", "speed_saturation"];
     for (name, control) in CONTROLS {
@@ -120,7 +116,7 @@ fn commands_that_belong_to_another_time_claim_nothing_of_the_motion_and_name_one
             shown(&diagnosis).into_iter().filter(|(_, effect)| motion.contains(&effect.as_str())).collect();
         assert!(claimed.is_empty(), "{name}: {claimed:?}");
         let new: Vec<_> = named(&diagnosis).difference(&known).cloned().collect();
-        assert_eq!(new, [(NEW.0, NEW.1.to_owned())], "{name}");
+        assert!(new.is_empty(), "{name}: {new:?}");
     }
 }
 
