@@ -136,7 +136,7 @@ impl Factor {
         }
     }
 
-    fn value(self, at: &Instant) -> f64 {
+    pub(crate) fn value(self, at: &Instant) -> f64 {
         let z = at.get(self.0);
         match self.1 {
             Form::Plain => z,

@@ -1,22 +1,36 @@
 //! What a robot did around every row of its residuals, in samples fine enough that rates can be summed over
 //! the window of a row.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use pleiad_physics::chain::actuator::servo;
 use pleiad_physics::{Context, Motion, Pose};
 
 use crate::channel::Channel;
 use crate::commanded;
-use crate::diagnosis::open::monomial::{Base, Instant};
+use crate::diagnosis::open::monomial::{Base, Factor, Instant, Monomial};
+use crate::diagnosis::open::target::Target;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::{Row, Stretch, Unit};
 use crate::schedule::Schedule;
 use crate::sightings;
 use crate::track::Track;
 
-/// Rates are summed in steps of about this, seconds.
-const STEP_S: f64 = 0.05;
-/// Set-points pass through the servo in steps of this, seconds.
-const SERVO_STEP_S: f64 = 0.01;
+/// Into how long steps time is divided, seconds.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Grain {
+    /// Rates are summed in steps of about this.
+    step_s: f64,
+    /// Set-points pass through the servo in steps of this.
+    servo_step_s: f64,
+}
+
+impl Grain {
+    pub(crate) const FINE: Self = Self { step_s: 0.05, servo_step_s: 0.01 };
+    /// Enough to see what is worth a closer look.
+    pub(crate) const COARSE: Self = Self { step_s: 0.25, servo_step_s: 0.05 };
+}
+
 /// Yaw acceleration is taken over twice this, seconds.
 const REACH_S: f64 = 0.05;
 /// Length of a window of the gyro, seconds.
@@ -36,16 +50,18 @@ pub(crate) struct Rolled {
     pub(crate) samples: Vec<Instant>,
     /// Cosine and sine of how much the heading differs from that in the middle of the window, of each sample.
     pub(crate) turned: Vec<[f64; 2]>,
+    /// Driven in the step of each sample, metres; 0 where it is not known.
+    pub(crate) driven_m: Vec<f64>,
     pub(crate) rows: Vec<Span>,
 }
 
 impl Rolled {
     /// The windows of a stretch, from `from_s` to `to_s` of each row.
-    fn new(track: &Track, ends_s: &[(f64, f64)]) -> Self {
+    fn new(track: &Track, ends_s: &[(f64, f64)], longest_s: f64) -> Self {
         let mut all = Self::default();
         for &(from_s, to_s) in ends_s {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a short window")]
-            let count = ((to_s - from_s) / STEP_S).round().max(1.0) as usize;
+            let count = ((to_s - from_s) / longest_s).round().max(1.0) as usize;
             let step_s = (to_s - from_s) / count as f64;
             let first = all.samples.len();
             let mut turned = 0.0;
@@ -54,6 +70,7 @@ impl Rolled {
                 let at = instant(track, from_s + (index as f64 + 0.5) * step_s);
                 let rate = known(at.get(Base::YawRate));
                 all.samples.push(at);
+                all.driven_m.push(known(at.get(Base::Speed) * step_s));
                 angles.push(turned + 0.5 * rate * step_s);
                 turned += rate * step_s;
             }
@@ -73,14 +90,11 @@ fn known(value: f64) -> f64 {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Driven {
     pub(crate) from_s: f64,
+    pub(crate) step_s: f64,
     pub(crate) samples: Vec<Instant>,
     pub(crate) ends_s: Vec<(f64, f64)>,
     /// Of the speed and of the yaw rate, seconds.
     pub(crate) time_constants_s: [f64; 2],
-}
-
-impl Driven {
-    pub(crate) const STEP_S: f64 = SERVO_STEP_S;
 }
 
 /// What a unit did, as far as its channels need it.
@@ -94,8 +108,18 @@ pub(crate) struct Motions {
 }
 
 impl Motions {
+    /// What was done at the samples of a stretch.
+    pub(crate) fn samples(&self, unit: &Unit<'_>, which: usize) -> &[Instant] {
+        match unit.stretches[which].channel {
+            Channel::Body | Channel::CommandedBody => &self.body.samples,
+            Channel::Gyro => &self.gyro.samples,
+            Channel::Actuator => &self.driven.samples,
+            _ => &self.readings[which],
+        }
+    }
+
     /// Under terms of a hypothesis: they may delay commands.
-    pub(crate) fn new(unit: &Unit<'_>, terms: &[Term]) -> Self {
+    pub(crate) fn new(unit: &Unit<'_>, terms: &[Term], grain: Grain) -> Self {
         let mut all = Self { readings: vec![Vec::new(); unit.stretches.len()], ..Self::default() };
         let Some((track, plans)) = unit.evidence.prepared(unit.robot()) else { return all };
         for (which, stretch) in unit.stretches.iter().enumerate().filter(|(_, stretch)| stretch.rows > 0) {
@@ -115,22 +139,62 @@ impl Motions {
                         })
                     };
                     let ends: Vec<(f64, f64)> = rows.iter().map(ends).collect();
-                    all.body = Rolled::new(track, &ends);
+                    all.body = Rolled::new(track, &ends, grain.step_s);
                 }
-                Channel::CommandedBody => all.body = Rolled::new(track, &around(commanded::WINDOW_S)),
-                Channel::Gyro => all.gyro = Rolled::new(track, &around(GYRO_WINDOW_S)),
+                Channel::CommandedBody => {
+                    all.body = Rolled::new(track, &around(commanded::WINDOW_S), grain.step_s);
+                }
+                Channel::Gyro => all.gyro = Rolled::new(track, &around(GYRO_WINDOW_S), grain.step_s),
                 Channel::Actuator => {
                     let ends = plans.actuator.items.iter().filter(|own| own.measured.is_some());
                     let ends: Vec<(f64, f64)> =
                         ends.map(|own| (own.window.from_s, own.window.to_s)).collect();
                     if ends.len() == stretch.rows {
-                        all.driven = driven(unit, track, terms, ends);
+                        all.driven = driven((unit, track), terms, ends, grain.servo_step_s);
                     }
                 }
                 _ => all.readings[which] = readings(unit, stretch),
             }
         }
         all
+    }
+}
+
+/// What the factors of monomials are at the samples of the stretches that show a target, each found once.
+pub(crate) struct Table {
+    /// By stretch.
+    factors: BTreeMap<usize, BTreeMap<Factor, Vec<f64>>>,
+    samples: BTreeMap<usize, usize>,
+}
+
+impl Table {
+    pub(crate) fn new(unit: &Unit<'_>, motions: &Motions, target: Target, monomials: &[&Monomial]) -> Self {
+        let wanted: BTreeSet<Factor> = monomials.iter().flat_map(|own| own.0.iter().copied()).collect();
+        let shown = target.shown(unit);
+        let of = |which: usize| {
+            let samples = motions.samples(unit, which);
+            let values = |factor: &Factor| (*factor, samples.iter().map(|at| factor.value(at)).collect());
+            wanted.iter().map(values).collect()
+        };
+        Self {
+            factors: shown.iter().map(|&which| (which, of(which))).collect(),
+            samples: shown.iter().map(|&which| (which, motions.samples(unit, which).len())).collect(),
+        }
+    }
+
+    /// The values of a monomial at the samples of a stretch; 0 where a base is not known.
+    pub(crate) fn values(&self, which: usize, monomial: &Monomial) -> Vec<f64> {
+        let mut values = vec![1.0; self.samples.get(&which).copied().unwrap_or(0)];
+        for own in self.factors.get(&which).into_iter().flat_map(|all| monomial.0.iter().map(|own| &all[own]))
+        {
+            for (value, factor) in values.iter_mut().zip(own) {
+                *value *= factor;
+            }
+        }
+        for value in &mut values {
+            *value = known(*value);
+        }
+        values
     }
 }
 
@@ -159,7 +223,12 @@ fn instant(track: &Track, time_s: f64) -> Instant {
 }
 
 /// Set-points when they act, how far the servo is behind them, and where the robot is.
-fn driven(unit: &Unit<'_>, track: &Track, terms: &[Term], ends_s: Vec<(f64, f64)>) -> Driven {
+fn driven(
+    (unit, track): (&Unit<'_>, &Track),
+    terms: &[Term],
+    ends_s: Vec<(f64, f64)>,
+    step_s: f64,
+) -> Driven {
     let model = unit.model(terms);
     let schedule = Schedule::new(&model, &track.commands);
     let (Some(first), Some(&(_, to_s))) = (schedule.all().first(), ends_s.last()) else {
@@ -169,15 +238,15 @@ fn driven(unit: &Unit<'_>, track: &Track, terms: &[Term], ends_s: Vec<(f64, f64)
     let context = Context::new(&model.nominal, from_s, Motion::at_rest(Pose::identity()));
     let servo = servo(&model, &context);
     let time_constants_s = [servo.time_constant_s, servo.time_constant_turn_s].map(|own| own.max(1e-3));
-    let keep = time_constants_s.map(|own| libm::exp(-SERVO_STEP_S / own));
+    let keep = time_constants_s.map(|own| libm::exp(-step_s / own));
     let mut reached = [0.0; 2];
     let mut next = 0;
     let mut asked = [0.0; 2];
     let mut samples = Vec::new();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "times of a recording")]
-    let count = ((to_s - from_s) / SERVO_STEP_S).ceil().max(0.0) as usize;
+    let count = ((to_s - from_s) / step_s).ceil().max(0.0) as usize;
     for index in 0..count {
-        let middle_s = from_s + (index as f64 + 0.5) * SERVO_STEP_S;
+        let middle_s = from_s + (index as f64 + 0.5) * step_s;
         while let Some(command) = schedule.all().get(next).filter(|command| command.from_s <= middle_s) {
             asked = [command.command.speed_m_s, command.command.yaw_rate_rad_s];
             next += 1;
@@ -198,7 +267,7 @@ fn driven(unit: &Unit<'_>, track: &Track, terms: &[Term], ends_s: Vec<(f64, f64)
         }
         samples.push(Instant::of(&at));
     }
-    Driven { from_s, samples, ends_s, time_constants_s }
+    Driven { from_s, step_s, samples, ends_s, time_constants_s }
 }
 
 /// What was driven and seen at every reading of a stretch.

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::diagnosis::open::bench::{Bench, Score};
+use crate::diagnosis::open::bench::{Bench, Score, Together};
 use crate::diagnosis::open::monomial::{Base, Instant, Monomial, of_motion, of_reading, of_sighting};
-use crate::diagnosis::open::motion::Motions;
+use crate::diagnosis::open::motion::{Grain, Motions, Table};
 use crate::diagnosis::open::picture::{Folds, Picture};
 use crate::diagnosis::open::spline::Basis;
-use crate::diagnosis::open::target::Target;
+use crate::diagnosis::open::target::{Function, Target};
 use crate::diagnosis::select::{FAMILYWISE, LEAST_GAIN};
 use crate::diagnosis::support::ODDS;
 use crate::diagnosis::term::Term;
@@ -20,6 +20,9 @@ const MOST_OF_ROBOT: usize = 8;
 const PRUNE: f64 = 1e-4;
 /// So many equivalent forms are told.
 const TOLD: usize = 6;
+/// In long steps this share of a gain makes a closer look worth it, and as many times the probability.
+const CLOSER: f64 = 0.4;
+const LENIENT: f64 = 1e3;
 /// Standard errors by which a size must exceed what is harmless.
 const NEAR_END: f64 = 3.0;
 
@@ -41,16 +44,21 @@ pub(crate) struct Curve {
     pub(crate) regressor: Base,
     pub(crate) basis: Basis,
     /// Positions of the knots whose functions are there, with their columns by unit.
-    pub(crate) columns: Vec<(usize, Vec<Column>)>,
+    pub(crate) columns: Knots,
     pub(crate) p: f64,
     pub(crate) gain: f64,
     pub(crate) inflation: f64,
 }
 
+/// Knots with the columns of their functions by unit.
+type Knots = Vec<(usize, Vec<Column>)>;
+
 /// What is looked for in one robot.
 pub(crate) struct Ground<'u, 'a> {
     pub(crate) units: Vec<&'u Unit<'a>>,
     pub(crate) motions: Vec<Motions>,
+    /// In long steps.
+    coarse: Vec<Motions>,
     pub(crate) targets: Vec<Target>,
     dictionaries: BTreeMap<Target, Vec<Monomial>>,
 }
@@ -60,7 +68,8 @@ impl<'u, 'a> Ground<'u, 'a> {
         let recorded = |target: &Target| units.iter().any(|unit| target.is_recorded(unit));
         let targets: Vec<Target> =
             Target::ALL.into_iter().filter(|own| recorded(own) && !skipped.contains(own)).collect();
-        let motions = units.iter().map(|unit| Motions::new(unit, terms)).collect();
+        let motions = |grain: Grain| units.iter().map(|unit| Motions::new(unit, terms, grain)).collect();
+        let (motions, coarse) = (motions(Grain::FINE), motions(Grain::COARSE));
         let wheels = units.iter().all(|unit| {
             unit.evidence.prepared(unit.robot()).is_some_and(|(track, _)| !track.encoders.is_empty())
         });
@@ -71,7 +80,7 @@ impl<'u, 'a> Ground<'u, 'a> {
             Target::Range | Target::Bearing => of_sighting(),
         };
         let dictionaries = targets.iter().map(|target| (*target, dictionary(target))).collect();
-        Self { units, motions, targets, dictionaries }
+        Self { units, motions, coarse, targets, dictionaries }
     }
 
     /// How many forms and curves are tried.
@@ -89,9 +98,46 @@ impl<'u, 'a> Ground<'u, 'a> {
         2.0 * (alike.max(1) as f64).ln()
     }
 
-    pub(crate) fn columns(&self, target: Target, function: &(dyn Fn(&Instant) -> f64 + Sync)) -> Vec<Column> {
+    pub(crate) fn columns(&self, target: Target, function: &Function<'_>) -> Vec<Column> {
+        self.columns_in(&self.motions, target, function)
+    }
+
+    fn columns_in(&self, motions: &[Motions], target: Target, function: &Function<'_>) -> Vec<Column> {
         let own = |(unit, motions): (&&Unit<'_>, &Motions)| target.column(unit, motions, function);
-        self.units.iter().zip(&self.motions).map(own).collect()
+        self.units.iter().zip(motions).map(own).collect()
+    }
+
+    /// The columns of monomials, in their order.
+    fn columns_of<'m>(
+        &'m self,
+        motions: &'m [Motions],
+        target: Target,
+        monomials: &'m [&'m Monomial],
+    ) -> impl Iterator<Item = (&'m Monomial, Vec<Column>)> {
+        let both = move || self.units.iter().zip(motions);
+        let table = |(unit, motions): (&&Unit<'_>, &Motions)| Table::new(unit, motions, target, monomials);
+        let tables: Vec<Table> = both().map(table).collect();
+        monomials.iter().map(move |&monomial| {
+            let column = |((unit, motions), table): ((&&Unit<'_>, &Motions), &Table)| {
+                target.gathered(unit, motions, &|which| table.values(which, monomial))
+            };
+            (monomial, both().zip(&tables).map(column).collect())
+        })
+    }
+
+    /// The monomials that are worth a closer look.
+    fn promising(&self, bench: &Bench, target: Target, tests: usize) -> Vec<&Monomial> {
+        let all: Vec<&Monomial> = self.dictionaries[&target].iter().collect();
+        let scored = self.columns_of(&self.coarse, target, &all).filter_map(|(monomial, columns)| {
+            let score = bench.score(&columns)?;
+            let clear = score.p * tests as f64 <= LENIENT * FAMILYWISE;
+            (clear && score.deflated() > CLOSER * LEAST_GAIN).then(|| (monomial.clone(), score.deflated()))
+        });
+        let scored: Vec<(Monomial, f64)> = scored.collect();
+        let most = scored.iter().map(|(_, gain)| *gain).fold(0.0, f64::max);
+        let near =
+            |own: &&Monomial| scored.iter().any(|(monomial, gain)| monomial == *own && *gain > CLOSER * most);
+        self.dictionaries[&target].iter().filter(near).collect()
     }
 
     /// The root mean square of columns in the component that shows the target most.
@@ -148,8 +194,8 @@ impl<'u, 'a> Ground<'u, 'a> {
             let harmless = self.harmless(target);
             let mut scored: Vec<(f64, &Monomial, Vec<Column>, f64)> = Vec::new();
             let mut alike: Vec<(f64, &Monomial)> = Vec::new();
-            for monomial in &self.dictionaries[&target] {
-                let columns = self.columns(target, &|at| monomial.value(at));
+            let monomials = self.promising(&bench, target, tests);
+            for (monomial, columns) in self.columns_of(&self.motions, target, &monomials) {
                 let Some(score) = bench.score(&columns) else { continue };
                 let worth = score.deflated() - self.price(target, monomial);
                 alike.push((worth, monomial));
@@ -255,6 +301,27 @@ impl<'u, 'a> Ground<'u, 'a> {
         best.1.map(|pair| pair.map(form).to_vec())
     }
 
+    /// The columns of a curve, and what it would gain.
+    fn curved(
+        &self,
+        bench: &Bench,
+        target: Target,
+        (regressor, basis): (Base, &Basis),
+        motions: &[Motions],
+    ) -> Option<(Knots, Together)> {
+        let column =
+            |knot: usize| self.columns_in(motions, target, &|at| basis.value(knot, at.get(regressor)));
+        let all: Knots = (0..basis.knots.len()).map(|knot| (knot, column(knot))).collect();
+        // Beside a constant that is fitted the height of the curve says nothing: it is zero in the middle.
+        let middle = basis.knots.len() / 2;
+        let bent: Knots = all.iter().filter(|(knot, _)| *knot != middle).cloned().collect();
+        let score = |own: &[(usize, Vec<Column>)]| {
+            let columns: Vec<Vec<Column>> = own.iter().map(|(_, columns)| columns.clone()).collect();
+            bench.score_together(&columns)
+        };
+        score(&all).map(|own| (all, own)).or_else(|| score(&bent).map(|own| (bent, own)))
+    }
+
     /// The best curve of a target beside a picture.
     pub(crate) fn curve(&self, picture: &Picture<'_, '_>, target: Target, tests: usize) -> Option<Curve> {
         let bench = Bench::new(picture, target)?;
@@ -269,19 +336,14 @@ impl<'u, 'a> Ground<'u, 'a> {
         for &regressor in target.regressors() {
             let values: Vec<f64> = instants.iter().flatten().map(|at| at.get(regressor)).collect();
             let Some(basis) = Basis::new(&values) else { continue };
-            let all: Vec<(usize, Vec<Column>)> = (0..basis.knots.len())
-                .map(|knot| (knot, self.columns(target, &|at| basis.value(knot, at.get(regressor)))))
-                .collect();
-            // Beside a constant that is fitted the height of the curve says nothing: it is zero in the middle.
-            let middle = basis.knots.len() / 2;
-            let bent: Vec<(usize, Vec<Column>)> =
-                all.iter().filter(|(knot, _)| *knot != middle).cloned().collect();
-            let score = |own: &[(usize, Vec<Column>)]| {
-                let columns: Vec<Vec<Column>> = own.iter().map(|(_, columns)| columns.clone()).collect();
-                bench.score_together(&columns)
-            };
-            let Some((columns, found)) =
-                score(&all).map(|own| (all, own)).or_else(|| score(&bent).map(|own| (bent, own)))
+            let (lenient, closer) = (LENIENT * FAMILYWISE, CLOSER * LEAST_GAIN);
+            let worth_it = self
+                .curved(&bench, target, (regressor, &basis), &self.coarse)
+                .is_some_and(|(_, found)| found.p * tests as f64 <= lenient && found.deflated() > closer);
+            if !worth_it {
+                continue;
+            }
+            let Some((columns, found)) = self.curved(&bench, target, (regressor, &basis), &self.motions)
             else {
                 continue;
             };

@@ -178,28 +178,46 @@ impl Target {
         self.channels().iter().find_map(|&(channel, component)| Some((stretch(channel)?, component)))
     }
 
+    /// The stretches of a unit that show it.
+    pub(crate) fn shown(self, unit: &Unit<'_>) -> Vec<usize> {
+        let shows = |which: &usize| {
+            let stretch = &unit.stretches[*which];
+            stretch.rows > 0 && self.shows_in(stretch.channel)
+        };
+        (0..unit.stretches.len()).filter(shows).collect()
+    }
+
     /// What the residuals of a unit gain for every unit of a function that is added.
     pub(crate) fn column(self, unit: &Unit<'_>, motions: &Motions, function: &Function<'_>) -> Column {
+        let value = |which: usize| motions.samples(unit, which).iter().map(function).collect();
+        self.gathered(unit, motions, &|which| value(which))
+    }
+
+    /// The same, from what the function is at the samples of each stretch that shows it.
+    pub(crate) fn gathered(
+        self,
+        unit: &Unit<'_>,
+        motions: &Motions,
+        values_of: &dyn Fn(usize) -> Vec<f64>,
+    ) -> Column {
         let mut column = Column::empty(unit);
-        for (which, stretch) in unit.stretches.iter().enumerate().filter(|(_, stretch)| stretch.rows > 0) {
-            if !self.shows_in(stretch.channel) {
-                continue;
-            }
+        for which in self.shown(unit) {
+            let stretch = &unit.stretches[which];
             let mut part = vec![0.0; stretch.rows * stretch.components];
+            let values = values_of(which);
             match stretch.channel {
-                Channel::Body | Channel::CommandedBody => self.roll(motions, function, &mut part),
+                Channel::Body | Channel::CommandedBody => self.roll(motions, &values, &mut part),
                 Channel::Gyro => {
-                    for (value, span) in part.iter_mut().zip(&motions.gyro.rows) {
-                        let samples = &motions.gyro.samples[span.first..span.first + span.count];
-                        *value = samples.iter().map(function).sum::<f64>() / span.count as f64;
+                    for (mean, span) in part.iter_mut().zip(&motions.gyro.rows) {
+                        let own = &values[span.first..span.first + span.count];
+                        *mean = own.iter().sum::<f64>() / span.count as f64;
                     }
                 }
-                Channel::Actuator => self.drive(unit, &motions.driven, function, &mut part),
+                Channel::Actuator => self.drive(unit, &motions.driven, &values, &mut part),
                 _ => {
+                    let rows = part.chunks_exact_mut(stretch.components);
                     let component = self.component(stretch.channel);
-                    for (row, at) in motions.readings[which].iter().enumerate() {
-                        part[row * stretch.components + component] = function(at);
-                    }
+                    rows.zip(values).for_each(|(row, value)| row[component] = value);
                 }
             }
             // A column is the derivative of measured minus predicted by a coefficient of the prediction.
@@ -222,23 +240,21 @@ impl Target {
     }
 
     /// Sums a rate of the body over windows, in the frame that the robot has in the middle of each.
-    fn roll(self, motions: &Motions, function: &Function<'_>, part: &mut [f64]) {
+    fn roll(self, motions: &Motions, rates: &[f64], part: &mut [f64]) {
         let body = &motions.body;
         for (values, &Span { first, count, step_s }) in part.chunks_exact_mut(3).zip(&body.rows) {
             // By how much the heading is off so far.
             let mut off_rad = 0.0;
-            for sample in first..first + count {
-                let at = &body.samples[sample];
-                let added = function(at) * step_s;
-                let [cos, sin] = body.turned[sample];
+            let samples = first..first + count;
+            let driven = body.turned[samples.clone()].iter().zip(&body.driven_m[samples.clone()]);
+            for (rate, (&[cos, sin], driven_m)) in rates[samples].iter().zip(driven) {
+                let added = rate * step_s;
                 let along = match self {
                     Self::Forward => [added, 0.0],
                     Self::Left => [0.0, added],
                     _ => {
                         off_rad += added;
-                        let speed = at.get(Base::Speed);
-                        let driven = if speed.is_finite() { speed * step_s } else { 0.0 };
-                        [0.0, driven * (off_rad - 0.5 * added)]
+                        [0.0, driven_m * (off_rad - 0.5 * added)]
                     }
                 };
                 values[0] += along[0] * cos - along[1] * sin;
@@ -249,21 +265,21 @@ impl Target {
     }
 
     /// Passes a set-point through the servo and sums it over the windows of the wheels.
-    fn drive(self, unit: &Unit<'_>, driven: &Driven, function: &Function<'_>, part: &mut [f64]) {
+    fn drive(self, unit: &Unit<'_>, driven: &Driven, set_points: &[f64], part: &mut [f64]) {
         let axis = usize::from(self == Self::SetYawRate);
-        let keep = libm::exp(-Driven::STEP_S / driven.time_constants_s[axis].max(1e-3));
+        let step_s = driven.step_s;
+        let keep = libm::exp(-step_s / driven.time_constants_s[axis].max(1e-3));
         let (mut reached, mut sum) = (0.0, 0.0);
         let mut sums = Vec::with_capacity(driven.samples.len() + 1);
         sums.push(0.0);
-        for at in &driven.samples {
-            let asked = function(at);
+        for &asked in set_points {
             let next = asked + (reached - asked) * keep;
-            sum += Driven::STEP_S * asked + driven.time_constants_s[axis] * (reached - next);
+            sum += step_s * asked + driven.time_constants_s[axis] * (reached - next);
             reached = next;
             sums.push(sum);
         }
         let until = |time_s: f64| {
-            let position = ((time_s - driven.from_s) / Driven::STEP_S).max(0.0);
+            let position = ((time_s - driven.from_s) / step_s).max(0.0);
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
             let before = (position as usize).min(sums.len() - 1);
             let after = (before + 1).min(sums.len() - 1);
@@ -295,7 +311,7 @@ impl Target {
                 let driven = &motions.driven;
                 let at = |&(from_s, to_s): &(f64, f64)| {
                     let middle_s = f64::midpoint(from_s, to_s);
-                    let position = ((middle_s - driven.from_s) / Driven::STEP_S).max(0.0);
+                    let position = ((middle_s - driven.from_s) / driven.step_s).max(0.0);
                     #[allow(
                         clippy::cast_possible_truncation,
                         clippy::cast_sign_loss,
