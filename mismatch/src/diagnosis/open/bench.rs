@@ -50,6 +50,13 @@ struct Part {
     active: Vec<(usize, Vec<f64>)>,
 }
 
+/// By block: information of a column, what it shares with each of the parameters, block by block, and its score.
+struct Sums {
+    own: Vec<f64>,
+    shared: Vec<f64>,
+    score: Vec<f64>,
+}
+
 /// A picture, prepared for columns of one target.
 pub(crate) struct Bench {
     parts: Vec<Part>,
@@ -58,6 +65,8 @@ pub(crate) struct Bench {
     inverse: DMatrix<f64>,
     /// By block: the scores of the parameters.
     scores: Vec<DVector<f64>>,
+    /// Their sum.
+    total_score: DVector<f64>,
     /// By block: the information of the parameters.
     information: Vec<DMatrix<f64>>,
 }
@@ -71,6 +80,7 @@ impl Bench {
             blocks,
             inverse: DMatrix::zeros(size, size),
             scores: vec![DVector::zeros(size); blocks],
+            total_score: DVector::zeros(size),
             information: vec![DMatrix::zeros(size, size); blocks],
         };
         let mut offset = 0;
@@ -122,6 +132,9 @@ impl Bench {
             }
             offset += unit.blocks;
         }
+        for own in &bench.scores {
+            bench.total_score += own;
+        }
         if size > 0 {
             let mut whole: DMatrix<f64> = DMatrix::zeros(size, size);
             for own in &bench.information {
@@ -136,12 +149,14 @@ impl Bench {
         (!bench.parts.is_empty()).then_some(bench)
     }
 
-    /// A column in sigmas, with what the parameters share with it, by block: own information, shared, score.
-    fn sums(&self, columns: &[Column]) -> (Vec<f64>, Vec<DVector<f64>>, Vec<f64>) {
+    /// A column in sigmas, with what the parameters share with it.
+    fn sums(&self, columns: &[Column]) -> Sums {
         let size = self.inverse.nrows();
-        let mut own = vec![0.0; self.blocks];
-        let mut shared = vec![DVector::zeros(size); self.blocks];
-        let mut score = vec![0.0; self.blocks];
+        let mut sums = Sums {
+            own: vec![0.0; self.blocks],
+            shared: vec![0.0; self.blocks * size],
+            score: vec![0.0; self.blocks],
+        };
         for part in &self.parts {
             let Some(values) = &columns[part.unit].parts[part.which] else { continue };
             for (row, value) in values.iter().enumerate() {
@@ -150,33 +165,54 @@ impl Bench {
                     continue;
                 }
                 let block = part.blocks[row];
-                own[block] += a * a;
-                score[block] += a * part.errors[row];
+                sums.own[block] += a * a;
+                sums.score[block] += a * part.errors[row];
+                let shared = &mut sums.shared[block * size..(block + 1) * size];
                 for (slot, b) in &part.active {
-                    shared[block][*slot] += a * b[row];
+                    shared[*slot] += a * b[row];
                 }
             }
         }
-        (own, shared, score)
+        sums
     }
 
-    /// What a column, one of each unit, would gain; `None` if it says nothing that the parameters do not, or in
-    /// too few blocks.
-    pub(crate) fn score(&self, columns: &[Column]) -> Option<Score> {
-        let (own, shared, score) = self.sums(columns);
-        let mut together = DVector::zeros(self.inverse.nrows());
-        for block in &shared {
-            together += block;
+    /// What all blocks together share with the parameters.
+    fn together(&self, sums: &Sums) -> DVector<f64> {
+        let size = self.inverse.nrows();
+        let mut together = DVector::zeros(size);
+        for block in 0..self.blocks {
+            for (slot, value) in together.iter_mut().enumerate() {
+                *value += sums.shared[block * size + slot];
+            }
         }
+        together
+    }
+
+    /// What a column, one of each unit, would gain; `None` if it says nothing that the parameters do not, in too
+    /// few blocks, or gains no more than `least`.
+    pub(crate) fn score(&self, columns: &[Column], least: f64) -> Option<Score> {
+        let size = self.inverse.nrows();
+        let sums = self.sums(columns);
+        let together = self.together(&sums);
         let by = &self.inverse * &together;
-        let full: f64 = own.iter().sum();
+        let full: f64 = sums.own.iter().sum();
+        // Deflating makes of a gain no greater one: what is small without blocks need not be looked at by block.
+        let whole = full - together.dot(&by);
+        let pull = sums.score.iter().sum::<f64>() - by.dot(&self.total_score);
+        if pull * pull <= least * whole {
+            return None;
+        }
         let mut scores = vec![0.0; self.blocks];
         let mut informations = vec![0.0; self.blocks];
         for block in 0..self.blocks {
-            scores[block] = score[block] - by.dot(&self.scores[block]);
-            informations[block] = (own[block] - 2.0 * by.dot(&shared[block])
-                + by.dot(&(&self.information[block] * &by)))
-            .max(0.0);
+            let shared: f64 =
+                by.iter().zip(&sums.shared[block * size..]).map(|(by, shared)| by * shared).sum();
+            scores[block] = sums.score[block] - by.dot(&self.scores[block]);
+            let mut among = 0.0;
+            for (column, by_column) in self.information[block].column_iter().zip(by.iter()) {
+                among += by_column * column.dot(&by);
+            }
+            informations[block] = (sums.own[block] - 2.0 * shared + among).max(0.0);
         }
         let information: f64 = informations.iter().sum();
         if information.partial_cmp(&(LEAST_LEFT * full)) != Some(std::cmp::Ordering::Greater) {
@@ -198,28 +234,34 @@ impl Bench {
         Some(Score { change, error, gain: total * change, inflation: meat / information, p })
     }
 
-    /// What several columns together would gain.
-    pub(crate) fn score_together(&self, columns: &[Vec<Column>]) -> Option<Together> {
+    /// What several columns together would gain; `None` if it is no more than `least`.
+    pub(crate) fn score_together(&self, columns: &[Vec<Column>], least: f64) -> Option<Together> {
         let count = columns.len();
-        let sums: Vec<_> = columns.iter().map(|own| self.sums(own)).collect();
+        let sums: Vec<Sums> = columns.iter().map(|own| self.sums(own)).collect();
         let size = self.inverse.nrows();
         let mut together = DMatrix::zeros(size, count);
-        for (k, (_, shared, _)) in sums.iter().enumerate() {
-            for block in shared {
-                let mut column = together.column_mut(k);
-                column += block;
-            }
+        for (k, own) in sums.iter().enumerate() {
+            together.set_column(k, &self.together(own));
         }
         let by = &self.inverse * &together;
         let cross = self.cross(columns);
+        let whole = cross.iter().sum::<DMatrix<f64>>() - together.transpose() * &by;
+        let pull = DVector::from_fn(count, |k, _| sums[k].score.iter().sum::<f64>())
+            - by.transpose() * &self.total_score;
+        // Deflating makes of a gain no greater one: what is small without blocks need not be looked at by block.
+        if let Some(factor) = whole.cholesky()
+            && factor.solve(&pull).dot(&pull) <= least
+        {
+            return None;
+        }
         let mut scores = vec![DVector::zeros(count); self.blocks];
         let mut informations = vec![DMatrix::zeros(count, count); self.blocks];
         let mut information = DMatrix::zeros(count, count);
         let mut total = DVector::zeros(count);
         for block in 0..self.blocks {
-            let shared = DMatrix::from_fn(size, count, |slot, k| sums[k].1[block][slot]);
+            let shared = DMatrix::from_fn(size, count, |slot, k| sums[k].shared[block * size + slot]);
             scores[block] =
-                DVector::from_fn(count, |k, _| sums[k].2[block]) - by.transpose() * &self.scores[block];
+                DVector::from_fn(count, |k, _| sums[k].score[block]) - by.transpose() * &self.scores[block];
             let mixed = shared.transpose() * &by;
             informations[block] =
                 &cross[block] - &mixed - mixed.transpose() + by.transpose() * &self.information[block] * &by;

@@ -129,7 +129,7 @@ impl<'u, 'a> Ground<'u, 'a> {
     fn promising(&self, bench: &Bench, target: Target, tests: usize) -> Vec<&Monomial> {
         let all: Vec<&Monomial> = self.dictionaries[&target].iter().collect();
         let scored = self.columns_of(&self.coarse, target, &all).filter_map(|(monomial, columns)| {
-            let score = bench.score(&columns)?;
+            let score = bench.score(&columns, CLOSER * LEAST_GAIN)?;
             let clear = score.p * tests as f64 <= LENIENT * FAMILYWISE;
             (clear && score.deflated() > CLOSER * LEAST_GAIN).then(|| (monomial.clone(), score.deflated()))
         });
@@ -196,7 +196,7 @@ impl<'u, 'a> Ground<'u, 'a> {
             let mut alike: Vec<(f64, &Monomial)> = Vec::new();
             let monomials = self.promising(&bench, target, tests);
             for (monomial, columns) in self.columns_of(&self.motions, target, &monomials) {
-                let Some(score) = bench.score(&columns) else { continue };
+                let Some(score) = bench.score(&columns, CLOSER * LEAST_GAIN) else { continue };
                 let worth = score.deflated() - self.price(target, monomial);
                 alike.push((worth, monomial));
                 let clear = score.p * tests as f64 <= FAMILYWISE && score.deflated() > LEAST_GAIN;
@@ -264,7 +264,7 @@ impl<'u, 'a> Ground<'u, 'a> {
         for (own, whole) in without.states.iter_mut().zip(&picture.states) {
             own.noise = whole.noise.clone();
         }
-        Bench::new(&without, form.target)?.score(&form.columns)
+        Bench::new(&without, form.target)?.score(&form.columns, 0.0)
     }
 
     /// Two forms of what a rest depends on that together do better than the forms of its target in a picture.
@@ -317,7 +317,7 @@ impl<'u, 'a> Ground<'u, 'a> {
         let bent: Knots = all.iter().filter(|(knot, _)| *knot != middle).cloned().collect();
         let score = |own: &[(usize, Vec<Column>)]| {
             let columns: Vec<Vec<Column>> = own.iter().map(|(_, columns)| columns.clone()).collect();
-            bench.score_together(&columns)
+            bench.score_together(&columns, CLOSER * LEAST_GAIN)
         };
         score(&all).map(|own| (all, own)).or_else(|| score(&bent).map(|own| (bent, own)))
     }

@@ -259,7 +259,7 @@ fn of_curve(
     let mut values = vec![0.0; curve.basis.knots.len()];
     let mut errors = vec![0.0; curve.basis.knots.len()];
     let bench = crate::diagnosis::open::bench::Bench::new(&without, curve.target);
-    let together = bench.and_then(|bench| bench.score_together(&curve.all_columns()));
+    let together = bench.and_then(|bench| bench.score_together(&curve.all_columns(), 0.0));
     for (index, ((knot, _), &position)) in curve.columns.iter().zip(positions).enumerate() {
         values[*knot] = picture.moved[position];
         errors[*knot] = together.as_ref().map_or(f64::NAN, |own| own.covariance[(index, index)].sqrt());
