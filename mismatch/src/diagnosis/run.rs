@@ -304,9 +304,8 @@ fn judgements(
     (pool, alone): (&Pool, bool),
     count: usize,
 ) -> Vec<Judgement> {
-    let mut all = Vec::new();
-    for group in groups {
-        let Some(mut support) = support(units, fit, group, pool, count) else { continue };
+    let each = parallel::map(groups, |group| {
+        let mut support = support(units, fit, group, pool, count)?;
         if alone {
             support.members.truncate(group.len());
         }
@@ -317,9 +316,9 @@ fn judgements(
             on_tests(tests, &fit.terms[group[0]], &support)
         };
         let judged = judge(units, &support, gain, count);
-        all.push(Judgement { group: group.clone(), support, judged, gain, unnamed_rivals: Vec::new() });
-    }
-    all
+        Some(Judgement { group: group.clone(), support, judged, gain, unnamed_rivals: Vec::new() })
+    });
+    each.into_iter().flatten().collect()
 }
 
 /// The gain on recordings that were not fitted on.
