@@ -6,6 +6,7 @@ use pleiad_physics::{Effect, Region};
 
 use crate::diagnosis::fit::State;
 use crate::diagnosis::linearize::{Request, linearized};
+use crate::diagnosis::scan::{best_rectangles, rectangles};
 use crate::diagnosis::select::Entry;
 use crate::diagnosis::starts::{Placing, Start, onsets, regions, starts};
 use crate::diagnosis::term::{Term, Whose};
@@ -29,6 +30,8 @@ pub(crate) struct Candidate {
     base: Columns,
     /// Whether rows before the onset or outside the region of the term are to be blanked.
     masked: bool,
+    /// Among how many places that refinement may lead to it was chosen.
+    pub(crate) looked: f64,
 }
 
 impl Candidate {
@@ -71,7 +74,7 @@ impl Candidate {
             .iter()
             .filter_map(|(unit, columns)| Some((place(*unit)?, Arc::clone(columns))))
             .collect();
-        Self { term: self.term.clone(), along: self.along.clone(), base, masked: self.masked }
+        Self { base, ..self.clone() }
     }
 
     /// Whether onset or region can be moved without a new linearization.
@@ -111,7 +114,9 @@ pub(crate) fn candidates(
         let placing = Placing::of(entry.0.info());
         match (shown(request, columns), placing.onset) {
             (Some(candidate), _) if !placing.is_some() => found[owner].push(candidate),
-            (Some(everywhere), _) => found[owner].extend(placed(&everywhere, placing, &acting(entry))),
+            (Some(everywhere), _) => {
+                found[owner].extend(placed(&everywhere, placing, units, (&acting(entry), states)));
+            }
             (None, Some(onset)) => {
                 for time_s in largest(entry.0, &own(entry), units, states) {
                     let mut term = request.term.clone();
@@ -130,14 +135,28 @@ pub(crate) fn candidates(
     found
 }
 
-/// The candidate at every onset and in every region.
-fn placed(everywhere: &Candidate, placing: Placing, units: &[&Unit<'_>]) -> Vec<Candidate> {
+/// The candidate at every onset and in every region: squares of all that was driven, and where it would gain most.
+fn placed(
+    everywhere: &Candidate,
+    placing: Placing,
+    units: &[&Unit<'_>],
+    (acting, states): (&[&Unit<'_>], &[State]),
+) -> Vec<Candidate> {
     let mut all = vec![Candidate { masked: true, ..everywhere.clone() }];
     if let Some(onset) = placing.onset {
-        all = expand(&all, &onsets(units), |values, time_s| values[onset] = time_s);
+        all = expand(&all, &onsets(acting), |values, time_s| values[onset] = time_s);
     }
     if let Some(first) = placing.region {
-        all = expand(&all, &regions(units), |values, region: [f64; 4]| {
+        let mut places = regions(acting);
+        // What a team measured of each other is not at one place.
+        if acting.iter().all(|unit| unit.mesh.is_none()) {
+            places.extend(best_rectangles(everywhere, units, states));
+        }
+        let looked = rectangles(acting);
+        for own in &mut all {
+            own.looked = looked;
+        }
+        all = expand(&all, &places, |values, region: [f64; 4]| {
             values[first..first + 4].copy_from_slice(&region);
         });
     }
@@ -205,5 +224,5 @@ fn shown(request: &Request, columns: Vec<(usize, Vec<Column>)>) -> Option<Candid
         let kept = columns.into_iter().zip(&shows).filter(|(_, shows)| **shows).map(|(column, _)| column);
         (unit, Arc::new(kept.collect()))
     };
-    Some(Candidate { term, along, base: columns.into_iter().map(keep).collect(), masked: false })
+    Some(Candidate { term, along, base: columns.into_iter().map(keep).collect(), masked: false, looked: 1.0 })
 }

@@ -31,6 +31,8 @@ mod related;
 mod robust;
 mod rolled;
 mod run;
+mod scan;
+mod seldom;
 mod select;
 mod series;
 mod spread;

@@ -12,6 +12,8 @@ use crate::diagnosis::entries::composition;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::held_out::{self, Gain};
 use crate::diagnosis::profile::{Profile, is_on};
+use crate::diagnosis::scan::rectangles;
+use crate::diagnosis::seldom::{Seen, inflation_everywhere, seen};
 use crate::diagnosis::select::{FAMILYWISE, wald};
 use crate::diagnosis::starts::Placing;
 use crate::diagnosis::support::Support;
@@ -140,7 +142,7 @@ pub(crate) struct Judged {
     pub(crate) p_familywise: f64,
     pub(crate) channel: Channel,
     pub(crate) place: Place,
-    /// The finding happened once: it cannot be cross-validated.
+    /// The finding happened once, or where a robot was too seldom: it cannot be cross-validated.
     pub(crate) one_off: bool,
 }
 
@@ -151,14 +153,21 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
     let mut estimated: Vec<Estimated> =
         group.iter().map(|&position| Estimated::of(fit, covariance, position)).collect();
     let acting: Vec<&Unit<'_>> = support.units.iter().map(|&unit| units[unit]).collect();
+    let main = &estimated[0];
     let parameters = estimated.iter().flat_map(|own| own.errors.iter().flatten()).count().max(1);
-    let ratio = 2.0 * (support.with.log_likelihood - support.without.log_likelihood) / support.inflation;
+    let seen = seen(&acting, &main.term);
+    let inflation = match seen {
+        Seen::Often => support.inflation,
+        _ => support.inflation.max(inflation_everywhere(&acting, &support.without, &main.term)),
+    };
+    let one_off = seen == Seen::Once || is_impulse(main.term.effect);
+    let ratio = 2.0 * (support.with.log_likelihood - support.without.log_likelihood) / inflation;
     let p_ratio = upper_tail(ratio, parameters);
     let p_wald = wald(fit, covariance, group).map_or(0.0, |(wald, count)| upper_tail(wald, count));
-    let p_familywise = (p_ratio.max(p_wald) * tests as f64).min(1.0);
-    let main = &estimated[0];
+    let looked =
+        if Placing::of(main.term.effect.info()).region.is_some() { rectangles(&acting) } else { 1.0 };
+    let p_familywise = (p_ratio.max(p_wald) * tests as f64 * looked).min(1.0);
     let effect = main.term.effect;
-    let one_off = is_impulse(effect);
     let total = total(&acting, (fit, covariance, group));
     let relevant = acting
         .iter()
@@ -166,7 +175,8 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
         .reduce(|a, b| a || b)
         .unwrap_or_else(|| changes_enough(&acting, support))
         || total.as_ref().is_some_and(|(_, total)| total.ci95[0] > 0.0);
-    let useful = one_off || gain.total > GAIN_ERRORS * gain.standard_error;
+    let errors = if seen == Seen::Seldom { 0.0 } else { GAIN_ERRORS };
+    let useful = one_off || gain.total > errors * gain.standard_error;
     let named = p_familywise < FAMILYWISE && relevant && useful;
     // Without encoders a name that needs them can only be a member of a set.
     let unseen = effect.info().channels.contains(&Needed::Encoders)

@@ -144,12 +144,9 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let unexplained = groups.iter().filter(|group| !explained(group[0]));
     notes.extend(unexplained.filter(|group| !named(group)).map(|group| nuisance(&fit.terms[group[0]])));
     notes.extend(spread.nuisances());
-    notes.extend(
-        found
-            .iter()
-            .filter(|own| own.judged.one_off)
-            .map(|own| format!("{} happened once and could not be cross-validated", own.name())),
-    );
+    notes.extend(found.iter().filter(|own| own.judged.one_off).map(|own| {
+        format!("{} happened once, or where robots were seldom, and could not be cross-validated", own.name())
+    }));
 
     let roller = Roller { prepared: &prepared, units: &units, tests: &tests };
     let kept = kept(&fit, &judgements);

@@ -172,7 +172,7 @@ pub(crate) fn score(units: &[&Unit<'_>], whites: &[White<'_, '_>], candidate: &C
         }
         step.gain *= (2.0 - 1.0 / change) / change;
     }
-    let p = upper_tail(step.wald, step.change.len());
+    let p = (upper_tail(step.wald, step.change.len()) * candidate.looked).min(1.0);
     Some(Scored { candidate: candidate.clone(), step, p })
 }
 

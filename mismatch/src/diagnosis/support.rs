@@ -11,7 +11,7 @@ use crate::diagnosis::fit::{Effort, Fit, Normal, Slot, columns, fit, fit_at};
 use crate::diagnosis::naming::{Estimated, is_unseen, twin};
 use crate::diagnosis::profile::{is_on, polish_some};
 use crate::diagnosis::refine::refine;
-use crate::diagnosis::select::{Pool, Scored, covariance, fit_beside, overlap, score, whites};
+use crate::diagnosis::select::{LEAST_GAIN, Pool, Scored, covariance, fit_beside, overlap, score, whites};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{White, step};
@@ -20,6 +20,9 @@ use crate::parallel;
 
 /// A rival explains the data about equally if it loses less than this, twice in log-likelihood: odds of 20.
 pub(crate) const ODDS: f64 = 5.991_464_547_107_98;
+/// A name is given if every rival loses at least this, twice in log-likelihood: a name is as rarely wrong as a finding
+/// is false (odds of 500, `2 ln(1 / FAMILYWISE)`).
+const NAMED: f64 = 12.429_216_196_844_383;
 /// Errors of the nominal geometry that every robot has a little of.
 const NOMINAL: [Effect; 3] = [Effect::WheelRadiusError, Effect::TrackWidthError, Effect::UnequalWheelRadii];
 /// A rival that loses more than this is none at its own references either.
@@ -120,25 +123,25 @@ pub(crate) fn support(
         let fit = fit_beside(&acting, &without, rival.term())?;
         let lost = |to: &Fit| 2.0 * (to.log_likelihood - fit.log_likelihood) / inflation;
         let mut less = lost(&with);
-        if meshed && less > ODDS && less < FAR {
+        if meshed && less > NAMED && less < FAR {
             let own = at_own_references(&acting, &fit, &with.states)? + slack(&acting, &fit);
             less = 2.0 * (own_reference? - own) / inflation;
         }
         // A rival of more parameters that does no better is the finding in disguise.
-        if less > ODDS || slots_of(&fit, fit.terms.len() - 1) > slots_of(&with, count) {
+        if less > NAMED || slots_of(&fit, fit.terms.len() - 1) > slots_of(&with, count) {
             return None;
         }
-        // It has to explain the same: beside a rival the finding is not needed. Another effect that also
-        // acts is no rival.
+        // It has to explain the same: beside a rival the finding would not be added. Another effect that also acts
+        // is no rival.
         let mut both = fit.clone();
         for &term in group {
             both = fit_beside(&acting, &both, full.terms[term].clone())?;
         }
         let mut needed = lost(&both);
-        if meshed && needed > ODDS && needed < FAR {
+        if meshed && needed > LEAST_GAIN && needed < FAR {
             needed += 2.0 * (slack(&acting, &both) - slack(&acting, &fit)) / inflation;
         }
-        (needed < ODDS).then_some(rival.candidate.term.effect)
+        (needed < LEAST_GAIN).then_some(rival.candidate.term.effect)
     });
     let mut members: Vec<Effect> = group.iter().map(|&term| full.terms[term].effect).collect();
     members.extend(fitted.into_iter().flatten());

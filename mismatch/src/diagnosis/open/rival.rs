@@ -18,6 +18,8 @@ use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::Unit;
 
+/// A name is given up for what is better by this, twice in log-likelihood: of much the same, the name.
+const NAME: f64 = 12.0;
 /// What other robots may say of a region, as a share of what one says, for it to be that robot's.
 const OTHERS: f64 = 0.02;
 
@@ -89,7 +91,7 @@ pub(crate) fn compared<'u, 'a>(
         let (forms, curves, notes) = (still.forms, still.curves, Vec::new());
         (Hypothesis { picture, base, forms, curves, short: first.short.clone(), notes }, dropped)
     });
-    let mut best = (worth(&first), first, Vec::new());
+    let mut best = (worth(&first) + NAME, first, Vec::new());
     for (own, dropped) in [Some((second, suspects)), third, fourth].into_iter().flatten() {
         let own_worth = worth(&own);
         if own_worth > best.0 && !(own.forms.is_empty() && own.curves.is_empty()) {
