@@ -24,6 +24,7 @@ mod mesh_filter;
 mod naming;
 mod noise;
 mod open;
+mod pairs;
 mod power;
 mod profile;
 mod refine;

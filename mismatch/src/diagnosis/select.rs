@@ -8,6 +8,7 @@ use pleiad_physics::{Channel as Needed, Effect, Parameter, Relevance};
 use crate::diagnosis::candidate::{Candidate, candidates};
 use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::fit::{Effort, Fit, Slot, State, fit, fit_from, with_another};
+use crate::diagnosis::pairs::with_two;
 use crate::diagnosis::profile::{is_on, is_threshold, polish_some};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::term::{Term, Whose};
@@ -27,6 +28,8 @@ const LEAST_SHARE: f64 = 0.4;
 const RIVALS: usize = 8;
 /// The most rounds of additions.
 const MOST_ROUNDS: usize = 24;
+/// So often two effects are added at once.
+const MOST_PAIRS: usize = 2;
 /// A step from "off" to a start is a sound guess if the data want between these multiples of it.
 const SOUND_STEP: std::ops::RangeInclusive<f64> = 0.2..=4.0;
 
@@ -85,8 +88,13 @@ pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry], terms: Vec<Term>) -
         }
     }
     let current = fit(units, current.terms, &|_| true, Effort::FULL)?;
-    let fit = prune(units, current)?;
-    Some(Selected { fit, tests, pool })
+    let mut fitted = prune(units, current)?;
+    // By what a team measured of each other a column is no column of one robot.
+    for _ in 0..if units.iter().all(|unit| unit.mesh.is_none()) { MOST_PAIRS } else { 0 } {
+        let Some(more) = with_two(units, &pool, &fitted) else { break };
+        fitted = prune(units, fit(units, more.terms, &|_| true, Effort::FULL)?)?;
+    }
+    Some(Selected { fit: fitted, tests, pool })
 }
 
 /// Linearized candidates. What is linear enough is kept when terms are added: it serves to choose whom to fit.
