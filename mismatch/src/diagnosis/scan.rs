@@ -6,8 +6,10 @@
 
 use pleiad_physics::Region;
 
+use crate::channel::Channel;
 use crate::diagnosis::candidate::Candidate;
 use crate::diagnosis::fit::State;
+use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::Unit;
 use crate::diagnosis::white::White;
 
@@ -131,7 +133,13 @@ pub(crate) fn best_rectangles(
     {
         told.push(next);
     }
-    told.into_iter().map(|own| sharpened(grid.bounds(own), &points, along, grid.cell_m)).collect()
+    // Where a robot is in the middle of a window says little of where in it a border lies.
+    let by_windows = touches(everywhere.term.effect, Channel::Body);
+    let bounds = told.into_iter().map(|own| grid.bounds(own));
+    if by_windows {
+        return bounds.collect();
+    }
+    bounds.map(|own| sharpened(own, &points, along, grid.cell_m)).collect()
 }
 
 /// What an element of residuals says of a parameter, and where the robot was.
