@@ -33,12 +33,7 @@ fn log(robot: u32, boot: u32, first: i64, bodies: Vec<Body>) -> Vec<Entry> {
 }
 
 fn seal(until: i64, logs: Vec<SealedLog>) -> Body {
-    Body::Seal(Seal {
-        observed: Timestamp(until),
-        answered: Timestamp(until),
-        closed: Timestamp::MIN,
-        logs,
-    })
+    Body::Seal(Seal { observed: Timestamp(until), answered: Timestamp(until), closed: Timestamp::MIN, logs })
 }
 
 #[test]
