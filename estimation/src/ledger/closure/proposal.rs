@@ -29,7 +29,7 @@ impl Ledger {
         if !closing.views.is_active(closing.owner) || closing.views.decided().is_some() {
             return None;
         }
-        let vote = accept(closing).or_else(|| self.propose(closing, wish));
+        let vote = self.accept(closing).or_else(|| self.propose(closing, wish));
         vote.or_else(|| self.promise(closing, wish)).or_else(|| self.begin(closing, wish))
     }
 
@@ -73,7 +73,6 @@ impl Ledger {
             return None;
         }
         let members = views.active().count();
-        let joined: BTreeSet<RobotId> = evict.union(&views.given_up(owner)).copied().collect();
         // An operator answers for those he has named, not for others who happen to be away.
         let by_operators =
             views.active().flat_map(|term| views.promises(term.robot)).filter(|vote| vote.operator);
@@ -82,6 +81,10 @@ impl Ledger {
         if wish.operator {
             named.extend(&evict);
         }
+        // Whoever was given up and is back need not go: those who have met him would not agree.
+        let given_up = views.given_up(owner);
+        let away = given_up.iter().filter(|robot| wish.absent.contains(robot) || named.contains(robot));
+        let joined: BTreeSet<RobotId> = evict.iter().chain(away).copied().collect();
         let operator = |removed: &BTreeSet<RobotId>| !removed.is_empty() && removed.is_subset(&named);
         let possible = |removed: &BTreeSet<RobotId>| {
             rules::may_decide(members, members - removed.len(), operator(removed))
@@ -110,7 +113,7 @@ impl Ledger {
         let accepted = views.staying(asked).flat_map(|robot| views.votes_of(robot));
         let accepted = accepted.map(|(_, vote)| (vote.ballot, vote)).filter(|(_, vote)| vote.accepted);
         if let Some(bound) = rules::bound(accepted, ballot) {
-            return Some(Vote { ballot, ..bound.clone() });
+            return Some(Vote { ballot, ..bound.clone() }).filter(|vote| self.holds_all_accepted(vote));
         }
         let mut held: BTreeMap<LogId, u64> = BTreeMap::new();
         for (log, length) in promises.iter().flat_map(|vote| &vote.held) {
@@ -118,13 +121,14 @@ impl Ledger {
             *slot = (*slot).max(*length);
         }
         let admit = wish.admit.iter().filter(|(robot, _)| !views.is_active(**robot));
-        Some(Vote {
+        let proposal = Vote {
             accepted: true,
             held: held.into_iter().collect(),
             added: admit.map(|(robot, boot)| (*robot, *boot)).collect(),
             from: promises.iter().map(|vote| vote.from).max().unwrap_or(Timestamp::MIN),
             ..asked.clone()
-        })
+        };
+        Some(proposal).filter(|vote| self.holds_all_accepted(vote))
     }
 
     /// A promise: what is held here of the logs of those who are to go, and how far this robot has sealed.
@@ -147,18 +151,21 @@ impl Ledger {
             operator,
         }
     }
-}
 
-/// Follows what another has proposed in its ballot.
-fn accept(closing: &Closing) -> Option<Vote> {
-    let (views, owner) = (&closing.views, closing.owner);
-    let promised = views.ballot(owner);
-    let proposals = views.active().flat_map(|term| views.votes_of(term.robot));
-    let mut proposals = proposals.map(|(_, vote)| vote).filter(|vote| vote.accepted);
-    let fresh = |vote: &Vote| !views.votes_of(owner).any(|(_, given)| given == vote);
-    proposals
-        .find(|vote| {
-            !vote.removed.contains(&owner) && rules::may_accept(promised, vote.ballot) && fresh(vote)
-        })
-        .cloned()
+    /// Follows what another has proposed in its ballot.
+    fn accept(&self, closing: &Closing) -> Option<Vote> {
+        let (views, owner) = (&closing.views, closing.owner);
+        let promised = views.ballot(owner);
+        let proposals = views.active().flat_map(|term| views.votes_of(term.robot));
+        let mut proposals = proposals.map(|(_, vote)| vote).filter(|vote| vote.accepted);
+        let fresh = |vote: &Vote| !views.votes_of(owner).any(|(_, given)| given == vote);
+        proposals
+            .find(|vote| {
+                !vote.removed.contains(&owner)
+                    && rules::may_accept(promised, vote.ballot)
+                    && fresh(vote)
+                    && self.holds_all_accepted(vote)
+            })
+            .cloned()
+    }
 }
