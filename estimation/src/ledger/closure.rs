@@ -194,12 +194,7 @@ impl Ledger {
     /// Whether a change is decided that cannot take effect here, because entries that it accepts are missing.
     pub fn lacks_accepted(&self) -> bool {
         let decided = self.closing.as_ref().and_then(|closing| closing.views.decided());
-        decided.is_some_and(|vote| !self.holds_all_accepted(vote))
-    }
-
-    /// Whether all is held that a change accepts of the logs of those who go.
-    fn holds_all_accepted(&self, vote: &Vote) -> bool {
-        vote.held.iter().all(|(log, held)| self.holds_accepted(*log, *held))
+        decided.is_some_and(|vote| vote.held.iter().any(|(log, held)| !self.holds_accepted(*log, *held)))
     }
 
     /// Whether all that is accepted of a log is held; its author may have said that it ends earlier.

@@ -59,7 +59,7 @@ impl Ledger {
         loop {
             let Some(closing) = &self.closing else { return };
             let Some(vote) = closing.views.decided() else { return };
-            if !self.holds_all_accepted(vote) {
+            if !vote.held.iter().all(|(log, held)| self.holds_accepted(*log, *held)) {
                 return;
             }
             let vote = vote.clone();

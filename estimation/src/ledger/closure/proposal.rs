@@ -29,7 +29,7 @@ impl Ledger {
         if !closing.views.is_active(closing.owner) || closing.views.decided().is_some() {
             return None;
         }
-        let vote = self.accept(closing).or_else(|| self.propose(closing, wish));
+        let vote = accept(closing).or_else(|| self.propose(closing, wish));
         vote.or_else(|| self.promise(closing, wish)).or_else(|| self.begin(closing, wish))
     }
 
@@ -113,7 +113,7 @@ impl Ledger {
         let accepted = views.staying(asked).flat_map(|robot| views.votes_of(robot));
         let accepted = accepted.map(|(_, vote)| (vote.ballot, vote)).filter(|(_, vote)| vote.accepted);
         if let Some(bound) = rules::bound(accepted, ballot) {
-            return Some(Vote { ballot, ..bound.clone() }).filter(|vote| self.holds_all_accepted(vote));
+            return Some(Vote { ballot, ..bound.clone() });
         }
         let mut held: BTreeMap<LogId, u64> = BTreeMap::new();
         for (log, length) in promises.iter().flat_map(|vote| &vote.held) {
@@ -121,14 +121,13 @@ impl Ledger {
             *slot = (*slot).max(*length);
         }
         let admit = wish.admit.iter().filter(|(robot, _)| !views.is_active(**robot));
-        let proposal = Vote {
+        Some(Vote {
             accepted: true,
             held: held.into_iter().collect(),
             added: admit.map(|(robot, boot)| (*robot, *boot)).collect(),
             from: promises.iter().map(|vote| vote.from).max().unwrap_or(Timestamp::MIN),
             ..asked.clone()
-        };
-        Some(proposal).filter(|vote| self.holds_all_accepted(vote))
+        })
     }
 
     /// A promise: what is held here of the logs of those who are to go, and how far this robot has sealed.
@@ -151,21 +150,18 @@ impl Ledger {
             operator,
         }
     }
+}
 
-    /// Follows what another has proposed in its ballot.
-    fn accept(&self, closing: &Closing) -> Option<Vote> {
-        let (views, owner) = (&closing.views, closing.owner);
-        let promised = views.ballot(owner);
-        let proposals = views.active().flat_map(|term| views.votes_of(term.robot));
-        let mut proposals = proposals.map(|(_, vote)| vote).filter(|vote| vote.accepted);
-        let fresh = |vote: &Vote| !views.votes_of(owner).any(|(_, given)| given == vote);
-        proposals
-            .find(|vote| {
-                !vote.removed.contains(&owner)
-                    && rules::may_accept(promised, vote.ballot)
-                    && fresh(vote)
-                    && self.holds_all_accepted(vote)
-            })
-            .cloned()
-    }
+/// Follows what another has proposed in its ballot.
+fn accept(closing: &Closing) -> Option<Vote> {
+    let (views, owner) = (&closing.views, closing.owner);
+    let promised = views.ballot(owner);
+    let proposals = views.active().flat_map(|term| views.votes_of(term.robot));
+    let mut proposals = proposals.map(|(_, vote)| vote).filter(|vote| vote.accepted);
+    let fresh = |vote: &Vote| !views.votes_of(owner).any(|(_, given)| given == vote);
+    proposals
+        .find(|vote| {
+            !vote.removed.contains(&owner) && rules::may_accept(promised, vote.ballot) && fresh(vote)
+        })
+        .cloned()
 }
