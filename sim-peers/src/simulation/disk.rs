@@ -49,6 +49,11 @@ impl Disk {
         *self = Self { full: self.full, ..Self::default() };
     }
 
+    /// Size of the journal.
+    pub fn bytes(&self) -> usize {
+        journal::header().len() + self.frames.iter().map(|frame| journal::frame(frame).len()).sum::<usize>()
+    }
+
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }

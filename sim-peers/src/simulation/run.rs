@@ -2,6 +2,7 @@
 
 mod agreement;
 mod processes;
+mod working;
 
 use std::collections::BTreeMap;
 
@@ -16,6 +17,8 @@ use super::disk::Disk;
 use super::network::{Network, Weather};
 use super::plan::{Blow, Plan};
 use super::team::{TICK_S, World, config};
+
+pub use working::{Hour, operate};
 
 /// Between two statuses of a node, s.
 const STATUS_S: f64 = 1.0;
@@ -99,58 +102,6 @@ pub fn run(seed: u64, options: &Options) -> Result<Outcome, Violation> {
     run.heal()?;
     run.agree()?;
     Ok(run.finish())
-}
-
-/// What a team keeps after so long.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hour {
-    /// Virtual time, h.
-    pub hour: f64,
-    /// Entries, facts and answers in the memory of the robot that keeps most.
-    pub kept: usize,
-    /// Records in the longest journal.
-    pub records: usize,
-    /// Facts used so far.
-    pub facts: usize,
-    /// Cuts closed so far, by all robots together.
-    pub cuts: u64,
-}
-
-/// A team that simply works for hours, on links that lose a tenth; `report` is told what it keeps.
-///
-/// # Errors
-/// As [`run`].
-pub fn operate(robots: u32, hours: f64, mut report: impl FnMut(Hour)) -> Result<(), Violation> {
-    let weather = Weather { loss: 0.1, burst: 5.0, delay_s: 0.01, jitter_s: 0.05, repeated: 0.05 };
-    let options = Options::default();
-    let plan = Plan {
-        robots,
-        seconds: hours * 3600.0,
-        cell_s: Some(5.0),
-        evict_after_s: None,
-        rebase_m: 300.0,
-        weather,
-        blows: Vec::new(),
-    };
-    let mut run = Run::new(1, plan, &options);
-    run.checks = Checks::new(robots).for_long();
-    run.set_up()?;
-    let steps = (hours * 4.0).ceil();
-    let mut step = 0.0;
-    while step < steps {
-        step += 1.0;
-        run.until(Timestamp::from_seconds(hours * 3600.0 * step / steps))?;
-        let nodes = run.robots.values().filter_map(|robot| robot.node.as_ref());
-        let facts = nodes.map(|node| node.ledger().counts().used).max().unwrap_or(0);
-        report(Hour {
-            hour: hours * step / steps,
-            kept: std::mem::take(&mut run.checks.most_kept),
-            records: std::mem::take(&mut run.outcome.most_records),
-            facts,
-            cuts: run.checks.cuts,
-        });
-    }
-    Ok(())
 }
 
 impl<'a> Run<'a> {

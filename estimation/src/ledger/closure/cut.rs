@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Closing, Decision};
-use crate::fact::{Body, Entry, EntryId, LogId, SealedLog, WHOLE, length_of};
+use crate::fact::{Body, Entry, EntryId, Fingerprint, LogId, SealedLog, WHOLE, length_of};
 use crate::fold::{FactKey, fold};
 use crate::ledger::checkpoint::{Checkpoint, LogBase};
 use crate::ledger::{Ledger, rules};
@@ -66,10 +66,13 @@ impl Ledger {
         }
         views.terms.retain(|term| term.until.is_none_or(|until| until >= cut));
 
+        // A log that ended before its first entry counts too: a later cut must know that it is over.
         let mut logs = BTreeMap::new();
-        for (id, start) in positions.iter().filter(|(_, start)| **start > 0) {
-            if let Some(log) = self.logs.get(id) {
-                let limit = limits.get(id).copied();
+        for (id, start) in &positions {
+            let limit = limits.get(id).copied();
+            if *start == 0 && limit == Some(0) {
+                logs.insert(*id, LogBase { start: 0, chain: Fingerprint::default(), limit });
+            } else if let Some(log) = self.logs.get(id).filter(|_| *start > 0) {
                 logs.insert(*id, LogBase { start: *start, chain: log.chain_before(*start), limit });
             }
         }

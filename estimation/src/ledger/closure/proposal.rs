@@ -73,7 +73,6 @@ impl Ledger {
             return None;
         }
         let members = views.active().count();
-        let joined: BTreeSet<RobotId> = evict.union(&views.given_up(owner)).copied().collect();
         // An operator answers for those he has named, not for others who happen to be away.
         let by_operators =
             views.active().flat_map(|term| views.promises(term.robot)).filter(|vote| vote.operator);
@@ -82,6 +81,10 @@ impl Ledger {
         if wish.operator {
             named.extend(&evict);
         }
+        // Whoever was given up and is back need not go: those who have met him would not agree.
+        let given_up = views.given_up(owner);
+        let away = given_up.iter().filter(|robot| wish.absent.contains(robot) || named.contains(robot));
+        let joined: BTreeSet<RobotId> = evict.iter().chain(away).copied().collect();
         let operator = |removed: &BTreeSet<RobotId>| !removed.is_empty() && removed.is_subset(&named);
         let possible = |removed: &BTreeSet<RobotId>| {
             rules::may_decide(members, members - removed.len(), operator(removed))
