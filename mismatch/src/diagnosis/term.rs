@@ -74,8 +74,12 @@ impl Term {
                 continue;
             }
             let (least, greatest) = parameter.plausible;
-            let circle = parameter.unit == "rad" && greatest - least > 2.0 * PI;
-            *value = if circle { value.wrapped() } else { value.clamp(least, greatest) };
+            // An angle that may be anything goes round; so does the phase of what repeats twice in a turn.
+            *value = match greatest - least {
+                range if parameter.unit == "rad" && range > 2.0 * PI => value.wrapped(),
+                range if parameter.unit == "rad" && range > PI => 0.5 * (2.0 * *value).wrapped(),
+                _ => value.clamp(least, greatest),
+            };
         }
     }
 }
