@@ -62,7 +62,7 @@ impl Node {
     /// Drops a peer's snapshot that rests on words that turn out not to be accepted. A member goes on as after the
     /// loss of its disk, with a new boot: that is how it came to take such a snapshot.
     pub(super) fn drop_contradicted(&mut self) {
-        // Who learns that he is out himself drops more than that.
+        // What else follows for who learns that he is out himself is in `check_membership`.
         let member = self.ledger.views().is_some_and(|views| views.is_active(self.config.robot));
         if self.ledger.is_contradicted() && (member || self.membership.joining.is_some()) {
             self.membership.transfer.taken_from = None;
