@@ -1,7 +1,8 @@
 //! Runs simulated schedules of a team: `cargo run -p pleiad-tests --features planted --example schedules -- --seeds A..B`.
 //!
-//! `--partitions` leaves out everything but losses and partitions; `--evictions` adds evictions. `--resume FILE` keeps there how far it
-//! has come, and goes on from there. `--plant NAME` plants a mistake and tells which seed finds it.
+//! `--partitions` leaves out everything but losses and partitions; `--evictions` adds evictions. `--keep-going`
+//! does not stop at the first seed that fails. `--resume FILE` keeps there how far it has come, and goes on
+//! from there. `--plant NAME` plants a mistake and tells which seed finds it.
 //! A seed that fails is printed with the command that replays it.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program of its own")]
@@ -50,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             other => {
                 return Err(format!(
-                    "{other}: expected --seeds, --partitions, --keep-going, --resume or --plant"
+                    "{other}: expected --seeds, --partitions, --evictions, --keep-going, --resume or --plant"
                 )
                 .into());
             }

@@ -196,9 +196,7 @@ pub enum Notice {
         cause: String,
     },
     /// This robot was evicted.
-    #[error(
-        "this robot was evicted from the team while it was away; it asks to be admitted from boot {boot} on"
-    )]
+    #[error("this robot was evicted from the team while it was away; it comes back with boot {boot}")]
     Evicted {
         /// The boot it will come back with.
         boot: BootIndex,

@@ -3,12 +3,12 @@
 
 use std::collections::BTreeSet;
 
-use pleiad_estimation::fact::{Body, Entry};
+use pleiad_estimation::fact::{Body, Entry, LogId};
 use pleiad_estimation::ledger::{Views, Wish, rules};
 use pleiad_estimation::sample::{Sample, SampleRefusal};
 use pleiad_estimation::{BootIndex, RobotId, Timestamp};
 
-use super::{Node, Notice};
+use super::{Node, Notice, Record};
 
 /// Statuses of each member without a vote after which a ballot is given up.
 const BALLOT_STATUSES: usize = 4;
@@ -23,6 +23,7 @@ impl Node {
         let robot = self.config.robot;
         let Some(views) = self.ledger.views() else { return };
         if views.is_active(robot) || self.membership.joining.is_some() {
+            self.leave_ended_boot();
             return;
         }
         let boot = self.next_boot();
@@ -32,18 +33,36 @@ impl Node {
             self.refuse_waiting(SampleRefusal::NotAMember { time: sample.time });
         }
         if evicted {
-            // What this robot has closed with its own last words is not what the others close.
-            self.ledger = Self::empty_ledger(&self.config);
+            // What this robot has closed with its own last words is not what the others close. The entries stay:
+            // of what is accepted this may be the last copy.
+            self.ledger.drop_base();
             self.out.records.extend(self.base_record());
+            self.out.records.extend(self.ledger.entries_after_cut().cloned().map(Record::Entry));
             self.membership.forget_cuts();
             self.notice(Notice::Evicted { boot });
+        }
+    }
+
+    /// Whoever was evicted and admitted again before it heard of either is in a boot whose log has ended, or is not
+    /// accepted at all. To go on in it would give an identity a second content: a new boot begins, as after the loss
+    /// of its disk.
+    fn leave_ended_boot(&mut self) {
+        let robot = self.config.robot;
+        let Some(boot) = self.boot.filter(|_| !self.superseded) else { return };
+        let goes_on =
+            self.ledger.open_logs(robot).any(|(log, held)| log == LogId { robot, boot } && held > 0);
+        if !goes_on {
+            self.boot = None;
+            self.forget_past();
+            self.membership.forget_cuts();
+            self.notice(Notice::Evicted { boot: self.next_boot() });
         }
     }
 
     /// Drops a peer's snapshot that rests on words that turn out not to be accepted. A member goes on as after the
     /// loss of its disk, with a new boot: that is how it came to take such a snapshot.
     pub(super) fn drop_contradicted(&mut self) {
-        // Who learns that he is out himself drops more than that.
+        // What else follows for who learns that he is out himself is in `check_membership`.
         let member = self.ledger.views().is_some_and(|views| views.is_active(self.config.robot));
         if self.ledger.is_contradicted() && (member || self.membership.joining.is_some()) {
             self.membership.transfer.taken_from = None;

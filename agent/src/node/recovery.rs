@@ -69,7 +69,7 @@ impl Node {
         self.known_boot = self.known_boot.max(own.map(|log| log.boot).max());
         let (cut, hash) = (checkpoint.time, checkpoint.fingerprint());
         if cut == Timestamp::MIN {
-            // Evicted: it had asked to be admitted, and has not forgotten it.
+            // Evicted: it had asked to be admitted, and has not forgotten it. The entries it keeps come next.
             self.ledger = Self::empty_ledger(&self.config);
             self.membership.joining = Some(self.next_boot());
             self.membership.forget_cuts();

@@ -2,6 +2,7 @@
 
 use pleiad_agent::{AgentConfig, Event, Node, Notice, Record};
 use pleiad_estimation::fact::Entry;
+use pleiad_estimation::ledger::Log;
 use pleiad_estimation::{BootIndex, RobotId};
 
 use crate::support::{Handled, agent, drive, feed, gps, handle, log, node_of, sees, velocity};
@@ -72,6 +73,33 @@ fn an_operator_evicts_the_other_of_two_and_the_past_is_closed_without_it() {
     handle(&mut one, Event::Evict(RobotId(2)));
     drive(&mut one, 20.0, 25.0, 0.1);
     assert!(one.ledger().cut().expect("a cut").seconds() >= 23.0);
+}
+
+#[test]
+fn who_is_evicted_keeps_what_is_accepted_of_it_and_after_a_restart_too() {
+    let (mut one, mut two) = (node_of(&closing(1), 1), node_of(&closing(2), 2));
+    let mut journal = Vec::new();
+    let mut heard = Vec::new();
+    for handled in drive(&mut two, 0.0, 4.0, 0.1) {
+        journal.extend(handled.journal);
+        heard.extend(handled.published);
+    }
+    let unheard: Vec<Handled> = drive(&mut two, 4.0, 8.0, 0.1);
+    journal.extend(unheard.into_iter().flat_map(|handled| handled.journal));
+    let mut said = published(drive(&mut one, 0.0, 8.0, 0.1));
+    said.extend(handle(&mut one, Event::Entries(heard)).published);
+    said.extend(handle(&mut one, Event::Evict(RobotId(2))).published);
+    let accepted = one.ledger().log(log(2, 0)).expect("a log").held();
+
+    let handled = handle(&mut two, Event::Entries(said));
+    let evicted = |notice: &Notice| matches!(notice, Notice::Evicted { .. });
+    assert!(handled.notices.iter().any(evicted), "{:?}", handled.notices);
+    journal.extend(handled.journal);
+    let again = Node::recover(closing(2).node().expect("a configuration"), 9, journal);
+    for node in [&two, &again] {
+        assert_eq!(node.ledger().log(log(2, 0)).map_or(0, Log::held), accepted);
+        assert_eq!(node.ledger().entries(log(2, 0), 0), one.ledger().entries(log(2, 0), 0));
+    }
 }
 
 #[test]
