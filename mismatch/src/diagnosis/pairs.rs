@@ -11,7 +11,7 @@ use pleiad_physics::Effect;
 
 use crate::diagnosis::candidate::Candidate;
 use crate::diagnosis::chi_square::upper_tail;
-use crate::diagnosis::fit::{Effort, Fit, fit};
+use crate::diagnosis::fit::Fit;
 use crate::diagnosis::select::{FAMILYWISE, LEAST_GAIN, Pool, fit_beside, whites};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Column, Unit};
@@ -25,17 +25,14 @@ const LEAST_LEFT: f64 = 1e-3;
 /// Two columns that are this much alike say one thing.
 const ALIKE: f64 = 1.0 - 1e-4;
 
-/// The fit with two effects more of one robot; `None` if no two are worth it.
-pub(crate) fn with_two(units: &[&Unit<'_>], pool: &Pool, current: &Fit) -> Option<Fit> {
+/// Two effects more of one robot, beside what is fitted; `None` if no two are worth it.
+pub(crate) fn two_more(units: &[&Unit<'_>], pool: &Pool, current: &Fit) -> Option<[Term; 2]> {
     let mut robots: Vec<Whose> = pool.candidates().map(|candidate| candidate.term.whose).collect();
     robots.sort_unstable();
     robots.dedup();
     robots.retain(|whose| matches!(whose, Whose::Robot(_)));
     let found = parallel::map(&robots, |&whose| of_robot(units, pool, current, whose));
-    let (_, added) = found.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let mut terms = current.terms.clone();
-    terms.extend(added);
-    fit(units, terms, &|_| true, Effort::RIVAL)
+    found.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, added)| added)
 }
 
 /// The best two of a robot, and what they gain.

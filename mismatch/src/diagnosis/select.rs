@@ -8,7 +8,7 @@ use pleiad_physics::{Channel as Needed, Effect, Parameter, Relevance};
 use crate::diagnosis::candidate::{Candidate, candidates};
 use crate::diagnosis::chi_square::upper_tail;
 use crate::diagnosis::fit::{Effort, Fit, Slot, State, fit, fit_from, with_another};
-use crate::diagnosis::pairs::with_two;
+use crate::diagnosis::pairs::two_more;
 use crate::diagnosis::profile::{is_on, is_threshold, polish_some};
 use crate::diagnosis::refine::refine;
 use crate::diagnosis::term::{Term, Whose};
@@ -90,9 +90,11 @@ pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry], terms: Vec<Term>) -
     let current = fit(units, current.terms, &|_| true, Effort::FULL)?;
     let mut fitted = prune(units, current)?;
     // By what a team measured of each other a column is no column of one robot.
-    for _ in 0..if units.iter().all(|unit| unit.mesh.is_none()) { MOST_PAIRS } else { 0 } {
-        let Some(more) = with_two(units, &pool, &fitted) else { break };
-        fitted = prune(units, fit(units, more.terms, &|_| true, Effort::FULL)?)?;
+    let meshed = units.iter().any(|unit| unit.mesh.is_some());
+    for _ in 0..if meshed { 0 } else { MOST_PAIRS } {
+        let Some(added) = two_more(units, &pool, &fitted) else { break };
+        let terms = fitted.terms.into_iter().chain(added).collect();
+        fitted = prune(units, fit(units, terms, &|_| true, Effort::FULL)?)?;
     }
     Some(Selected { fit: fitted, tests, pool })
 }

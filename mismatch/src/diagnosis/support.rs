@@ -18,7 +18,8 @@ use crate::diagnosis::white::{White, step};
 use crate::diagnosis::without_truth::at_own_references;
 use crate::parallel;
 
-/// A rival explains the data about equally if it loses less than this, twice in log-likelihood: odds of 20.
+/// Of forms, and of effects of spread: what loses less than this describes the data about equally, twice in
+/// log-likelihood: odds of 20.
 pub(crate) const ODDS: f64 = 5.991_464_547_107_98;
 /// A name is given if every rival loses at least this, twice in log-likelihood: a name is as rarely wrong as a finding
 /// is false (odds of 500, `2 ln(1 / FAMILYWISE)`).
