@@ -1,5 +1,6 @@
 //! The command line, as clap sees it.
 
+mod survey;
 mod values;
 
 use std::path::PathBuf;
@@ -9,6 +10,7 @@ use pleiad_benchmark::Asked;
 use pleiad_estimation::strategy::StrategyKind;
 use pleiad_sim_peers::scenario::ManoeuvreKind;
 
+pub use survey::SurveyArgs;
 pub use values::{AbsoluteArg, LandmarksArg};
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
@@ -38,6 +40,8 @@ pub enum Command {
     Benchmark(Benchmark),
     /// What loss and partitions do to each strategy: the table of strategies by fault level.
     Faults(FaultsArgs),
+    /// The systems that the joint filter grew from, each as a study with its claims: Kalman filter, gyro, rover and others.
+    Survey(SurveyArgs),
     /// The physics a simulation can leave out: names, parameters, equations.
     Effects(EffectsArgs),
     /// One robot's agent.

@@ -15,6 +15,8 @@ mod runner;
 mod shells;
 mod sim_peers;
 mod simulate;
+mod study;
+mod survey;
 
 pub use runner::Survived;
 
@@ -31,6 +33,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Benchmark(Benchmark::Concealed(args)) => concealed::run(&args),
         Command::Faults(args) => faults::run(&args),
+        Command::Survey(args) => survey::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Agent(args) => agent::run(&args),
         Command::Coordinator(args) => coordinator::run(&args),

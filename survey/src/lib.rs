@@ -1,0 +1,16 @@
+//! The systems that the joint filter grew from, each as a study: a scenario, the system on it over many seeds,
+//! and the claim it is known for with what was measured.
+//!
+//! A study uses the filters of `estimation`, the calibration of `mismatch` and the simulator of `sim-peers`; nothing
+//! is simulated or filtered here by means of its own.
+
+mod error;
+mod monte_carlo;
+mod study;
+
+pub use error::SurveyError;
+pub use monte_carlo::{Estimate, over_seeds, share};
+pub use study::{Claim, Known, Shown, Study, StudyOptions};
+
+/// The studies of `pleiad survey`, in the order of the survey's sections.
+pub const STUDIES: &[Known] = &[];
