@@ -3,7 +3,8 @@
 
 use pleiad_estimation::RobotId;
 use pleiad_mismatch::{
-    Explained, Finding, Findings, MismatchError, Structure, acts_on_every_robot, explained, fit_known,
+    Explained, Finding, Findings, MismatchError, Structure, acts_on_every_robot, composition, explained,
+    fit_known,
 };
 use pleiad_physics::{Effect, Fit};
 use pleiad_recording::Recording;
@@ -34,6 +35,10 @@ pub struct Oracle {
     /// the refitted nominal model, and by what the tool said. `None` where effects of spread act, which it cannot
     /// tell.
     pub held_out: Option<[f64; 4]>,
+    /// What the structure that the tool named loses against the true one, fitted to everything, deflated; `None` if
+    /// it named nothing, or where effects of spread act.
+    #[serde(default)]
+    pub tool_loses: Option<f64>,
 }
 
 impl Oracle {
@@ -49,9 +54,19 @@ impl Oracle {
         rivals.map(|(_, _, loses)| *loses).min_by(f64::total_cmp)
     }
 
-    /// Whether a rival does nearly as well.
+    /// Whether a rival does nearly as well. An effect that is by its equation two others together always has one.
     pub fn has_rival(&self) -> bool {
-        self.best_rival().is_some_and(|loses| loses < IDENTIFIABLE)
+        let composed = |own: &Known| Effect::from_name(&own.effect).and_then(composition).is_some();
+        self.effects.iter().any(composed) || self.best_rival().is_some_and(|loses| loses < IDENTIFIABLE)
+    }
+
+    /// Whether effects other than those that act reproduce the recording: a single one, of any number of parameters, or
+    /// the several that the tool named, which are shown to by being fitted.
+    pub fn is_reproduced(&self) -> bool {
+        let close = |loses: f64| loses < IDENTIFIABLE;
+        self.has_rival()
+            || self.rivals.iter().any(|(_, _, loses)| close(*loses))
+            || self.tool_loses.is_some_and(close)
     }
 }
 
@@ -95,6 +110,7 @@ pub fn oracle(recording: &Recording, answer: &Answer, said: &Findings) -> Result
     let parts = structures.len();
     structures.push(refitted(&truth, &tool));
     let same = alike(&truth, &tool);
+    let named = !tool.is_empty() && !same;
     if !same {
         structures.push(tool);
     }
@@ -107,6 +123,8 @@ pub fn oracle(recording: &Recording, answer: &Answer, said: &Findings) -> Result
         oracle.rivals =
             rivals.map(|own| (own.effect.name().to_owned(), name(own.robot), deflated(own.loses))).collect();
         let tool = if same { whole.held_out } else { all.last().map_or(0.0, |own| own.held_out) };
+        let loses = || Some(deflated(whole.gain - all.last()?.gain));
+        oracle.tool_loses = if named { loses() } else { None };
         oracle.held_out = Some([whole.held_out, whole.held_out_se, all[parts].held_out, tool]);
     }
     for (index, own) in answer.injected.iter().enumerate() {
@@ -246,5 +264,16 @@ mod tests {
         assert!(!oracle("longitudinal_slip", &[("low_friction_overall", 0.1)]).has_rival());
         assert!(oracle("low_friction_overall", &[("longitudinal_slip", 5.0)]).has_rival());
         assert!(!oracle("longitudinal_slip", &[]).has_rival());
+        // Two others, by its equation.
+        assert!(oracle("payload_offset", &[]).has_rival());
+    }
+
+    #[test]
+    fn what_is_left_out_is_reproduced_by_one_of_more_parameters_or_by_several_that_were_named() {
+        let own = oracle("wheel_radius_error", &[("payload_added", 0.1)]);
+        assert!(!own.has_rival() && own.is_reproduced());
+        let several = |loses: Option<f64>| Oracle { tool_loses: loses, ..oracle("icr_offset", &[]) };
+        assert!(several(Some(11.0)).is_reproduced());
+        assert!(!several(Some(13.0)).is_reproduced() && !several(None).is_reproduced());
     }
 }

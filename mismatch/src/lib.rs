@@ -44,7 +44,7 @@ pub use compare::{
 pub use diagnose::{DiagnoseOptions, Diagnosis, TruthUse, Without, diagnose};
 pub use diagnosis::{
     Design, DesignColumn, Explained, Interval, KnownFit, KnownParameter, Rival, Structure,
-    acts_on_every_robot, design, explained, fit_known, log_likelihood,
+    acts_on_every_robot, composition, design, explained, fit_known, log_likelihood,
 };
 pub use error::MismatchError;
 pub use evidence::Evidence;

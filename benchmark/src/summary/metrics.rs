@@ -164,12 +164,17 @@ fn of_class(rows: &mut Rows<'_>, cases: &[&CaseResult]) {
         }
         Class::OutOfCatalogue => {
             // Where something else does as well, its name is no wrong one.
-            let clear = || {
-                let own = cases.iter().filter(|own| own.oracle.effects.iter().all(|known| known.detectable));
-                own.filter(|own| !own.oracle.has_rival())
-            };
+            let seen = || cases.iter().filter(|own| own.oracle.effects.iter().all(|known| known.detectable));
+            let clear = || seen().filter(|own| !own.oracle.is_reproduced());
+            let wrong = |own: &CaseResult| own.tool.extra.iter().any(|said| !said.starts_with("cannot_tell"));
+            rows.share(TOOL, "what remains reproduces it", seen().map(|own| own.oracle.is_reproduced()));
             let expressed = |own: &&&CaseResult| own.tool.nameless.iter().any(|said| said.contains('['));
-            rows.share(TOOL, "wrong name", clear().map(|own| !own.tool.extra.is_empty()));
+            rows.share(TOOL, "wrong name", clear().map(|own| wrong(own)));
+            rows.share(
+                TOOL,
+                "cannot_tell, with a name in the set",
+                clear().map(|own| !wrong(own) && !own.tool.extra.is_empty()),
+            );
             rows.share(TOOL, "an expression", clear().map(|own| expressed(&own)));
             let without = |own: &&&CaseResult| {
                 own.tool.extra.is_empty() && !own.tool.nameless.is_empty() && !expressed(own)

@@ -160,7 +160,7 @@ fn all_may_be_late(unit: &Unit<'_>) -> bool {
 
 /// The effects that an effect is the same as, together: a cause that shows in two elementary ways. The
 /// elementary ones are tried, and it is named as their rival.
-pub(crate) fn composition(effect: Effect) -> Option<[Effect; 2]> {
+pub fn composition(effect: Effect) -> Option<[Effect; 2]> {
     match effect {
         Effect::PayloadOffset => Some([Effect::UnequalWheelRadii, Effect::TrackWidthError]),
         _ => None,

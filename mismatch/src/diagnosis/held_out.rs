@@ -17,11 +17,44 @@ pub(crate) const FOLDS: usize = 5;
 /// Nothing this close to a fold is fitted, seconds.
 pub(crate) const EMBARGO_S: f64 = 5.0;
 
+/// In fewer blocks than this a gain is hardly above two of its standard errors, however clear it is in each.
+pub(crate) const FEWEST_BLOCKS: usize = 10;
+/// So many blocks must speak for what shows in few.
+const LEAST_BLOCKS: usize = 3;
+/// A block speaks for or against a model by at least this, in log-likelihood.
+const SPEAKS: f64 = 1.0;
+/// What a model explains is as small as the rest under it, in mean squared sigmas.
+const ORDINARY: f64 = 1.5;
+/// What a model changes by less than this is as it was, in log-likelihood.
+const CHANGED: f64 = 1e-3;
+
 /// A gain of log score with its standard error.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Gain {
     pub(crate) total: f64,
     pub(crate) standard_error: f64,
+    /// It arises in few blocks of time, at least three; in none of them anything is lost, and what is left there is as
+    /// small as elsewhere. A deadband acts where a robot is slow and nowhere else: no two standard errors can be
+    /// reached there. A burst of wild readings that a model takes up in part would leave more than elsewhere.
+    pub(crate) consistent: bool,
+}
+
+impl Gain {
+    /// Whether the gain may be relied on: more than so many of its standard errors, or little but consistent.
+    pub(crate) fn is_useful(&self, errors: f64) -> bool {
+        self.total > errors * self.standard_error || self.consistent
+    }
+}
+
+/// What one block of time says of two models.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    /// Of log score.
+    gain: f64,
+    /// Squared sigmas under the better model, of what it changes.
+    left: f64,
+    /// The number of such elements.
+    changed: usize,
 }
 
 /// A fold of a unit: its span of time.
@@ -77,7 +110,7 @@ pub(crate) fn left_out(units: &[&Unit<'_>], fit: &Fit, number: usize) -> (Vec<Te
 
 /// The gain of one fit over another on folds that neither saw.
 pub(crate) fn cross_fitted(units: &[&Unit<'_>], with: &Fit, without: &Fit) -> Gain {
-    let mut blocks: Vec<Vec<f64>> = units.iter().map(|unit| vec![0.0; unit.blocks]).collect();
+    let mut blocks: Vec<Vec<Block>> = units.iter().map(|unit| vec![Block::default(); unit.blocks]).collect();
     for number in 0..FOLDS {
         let (_, with) = left_out(units, with, number);
         let (_, without) = left_out(units, without, number);
@@ -87,36 +120,57 @@ pub(crate) fn cross_fitted(units: &[&Unit<'_>], with: &Fit, without: &Fit) -> Ga
             add(unit, with, without, blocks, &|index| fold.contains(&unit.rows[index].time_s));
         }
     }
-    summed(&blocks)
+    told(&blocks)
 }
 
 /// The gain of one set of states over another, where noise is known from elsewhere.
 pub(crate) fn compared(units: &[&Unit<'_>], with: &[State], without: &[State]) -> Gain {
-    let mut blocks: Vec<Vec<f64>> = units.iter().map(|unit| vec![0.0; unit.blocks]).collect();
+    let mut blocks: Vec<Vec<Block>> = units.iter().map(|unit| vec![Block::default(); unit.blocks]).collect();
     for ((unit, blocks), (with, without)) in units.iter().zip(&mut blocks).zip(with.iter().zip(without)) {
         add(unit, with, without, blocks, &|_| true);
     }
-    summed(&blocks)
+    told(&blocks)
 }
 
-/// Adds the gain of each element to its block.
-fn add(unit: &Unit<'_>, with: &State, without: &State, blocks: &mut [f64], held: &dyn Fn(usize) -> bool) {
+/// Adds what each element says to its block.
+fn add(unit: &Unit<'_>, with: &State, without: &State, blocks: &mut [Block], held: &dyn Fn(usize) -> bool) {
+    let left = squares(unit, with, with);
     for (index, gain) in gains(unit, with, without).into_iter().enumerate() {
         if held(index) {
-            blocks[unit.block_of[index]] += gain;
+            let block = &mut blocks[unit.block_of[index]];
+            block.gain += gain;
+            if gain.abs() > CHANGED {
+                block.left += left[index];
+                block.changed += 1;
+            }
         }
     }
+}
+
+/// Sum over blocks, and whether few of them are of one mind.
+fn told(units: &[Vec<Block>]) -> Gain {
+    let gains: Vec<Vec<f64>> =
+        units.iter().map(|blocks| blocks.iter().map(|block| block.gain).collect()).collect();
+    let speak: Vec<&Block> = units.iter().flatten().filter(|block| block.gain.abs() > SPEAKS).collect();
+    let few = (LEAST_BLOCKS..FEWEST_BLOCKS).contains(&speak.len());
+    let (left, changed) =
+        speak.iter().fold((0.0, 0), |(left, changed), block| (left + block.left, changed + block.changed));
+    let consistent = few && speak.iter().all(|block| block.gain > 0.0) && left <= ORDINARY * changed as f64;
+    Gain { consistent, ..summed(&gains) }
 }
 
 /// Log-density that each element gains by the better model, both at the noise of the better one: a model gains
 /// by what it predicts, not by claiming less noise where errors are small and more where they are not. What
 /// is farther off than [`noise::CLIP`] sigmas counts as that far, so that no instant outweighs the rest.
 pub(crate) fn gains(unit: &Unit<'_>, with: &State, without: &State) -> Vec<f64> {
-    let squares = |state: &State| -> Vec<f64> {
-        let errors = with.noise.whitened(unit, &state.residuals);
-        errors.into_iter().map(|error| error.abs().min(noise::CLIP).powi(2)).collect()
-    };
-    squares(without).into_iter().zip(squares(with)).map(|(without, with)| 0.5 * (without - with)).collect()
+    let each = squares(unit, with, without).into_iter().zip(squares(unit, with, with));
+    each.map(|(without, with)| 0.5 * (without - with)).collect()
+}
+
+/// Squared residuals of `state` in sigmas of `with`, clipped.
+fn squares(unit: &Unit<'_>, with: &State, state: &State) -> Vec<f64> {
+    let errors = with.noise.whitened(unit, &state.residuals);
+    errors.into_iter().map(|error| error.abs().min(noise::CLIP).powi(2)).collect()
 }
 
 /// Sum over blocks; its variance with the covariance of neighbours (`newey1987`, one lag).
@@ -129,5 +183,5 @@ pub(crate) fn summed(units: &[Vec<f64>]) -> Gain {
         variance += blocks.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
         variance += blocks.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum::<f64>();
     }
-    Gain { total, standard_error: variance.max(0.0).sqrt() }
+    Gain { total, standard_error: variance.max(0.0).sqrt(), consistent: false }
 }

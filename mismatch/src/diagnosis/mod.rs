@@ -29,6 +29,7 @@ mod power;
 mod profile;
 mod refine;
 mod related;
+mod rest;
 mod robust;
 mod rolled;
 mod run;
@@ -46,6 +47,7 @@ mod white;
 mod without_truth;
 
 pub use design::{Design, DesignColumn, design};
+pub use entries::composition;
 pub use explained::{Explained, Rival, Structure, explained};
 pub use known::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known, log_likelihood};
 pub(crate) use mesh::{LOST, STATES, about, carried, gradient};

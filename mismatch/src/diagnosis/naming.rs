@@ -176,7 +176,7 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
         .unwrap_or_else(|| changes_enough(&acting, support))
         || total.as_ref().is_some_and(|(_, total)| total.ci95[0] > 0.0);
     let errors = if seen == Seen::Seldom { 0.0 } else { GAIN_ERRORS };
-    let useful = one_off || gain.total > errors * gain.standard_error;
+    let useful = one_off || gain.is_useful(errors);
     let named = p_familywise < FAMILYWISE && relevant && useful;
     // Without encoders a name that needs them can only be a member of a set.
     let unseen = effect.info().channels.contains(&Needed::Encoders)

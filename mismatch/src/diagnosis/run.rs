@@ -8,6 +8,7 @@ use pleiad_physics::{Effect, Floors, RobotModel};
 use pleiad_recording::Recording;
 
 use crate::builtin;
+use crate::channel::Channel;
 use crate::diagnose::{DiagnoseOptions, Diagnosis, TruthUse};
 use crate::diagnosis::corrected;
 use crate::diagnosis::entries::{Entries, SHORT_S, entries, lasting_s, unseen};
@@ -17,6 +18,7 @@ use crate::diagnosis::lag::paired;
 use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, judge};
 use crate::diagnosis::open::{Opened, open};
 use crate::diagnosis::power::undetected;
+use crate::diagnosis::rest;
 use crate::diagnosis::rolled::{self, Rolled, Roller};
 use crate::diagnosis::select::{Entry, Pool, Selected, select};
 use crate::diagnosis::series;
@@ -87,7 +89,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     };
     let mut entries = entries(&fitted).tried(options);
     let tried = entries.entries.len() + entries.untestable.len();
-    let spread_entries = spread::take(&mut entries, &alone);
+    let spread_entries = spread::take(&mut entries, &alone, &options.leave_out);
 
     let mut notes = notes(&prepared, &all, &fitted);
     let mut selected = select(&units, &entries.entries, Vec::new());
@@ -117,7 +119,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let mut judgements = judgements(&units, &tests, &fit, &groups, (&pool, options.without.sets), count);
     let fit_alone = if by_reference { alone_under(&alone, &fit) } else { Some(fit.clone()) };
     let mut spread = fit_alone.as_ref().map_or_else(Spread::default, |fit| {
-        spread::spread(&alone, &tests_alone, fit, &spread_entries, &swaps, count)
+        spread::spread(&alone, &tests_alone, fit, &spread_entries, &swaps, (count, &options.leave_out))
     });
     spread.explain(&mut judgements, &mut notes);
     let recorded: Vec<String> = prepared.iter().map(|own| own.recording.name.clone()).collect();
@@ -126,6 +128,9 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         if by_reference { Opened::default() } else { open(&units, &tests, &recorded, &fit, &spread, count) };
     opened.displace(&mut judgements, &mut spread, &mut notes);
     opened.doubt(&units, &mut judgements);
+    let told =
+        |robot: RobotId, channel: Channel| spread.shows(robot, channel) || opened.shows(robot, channel);
+    rest::doubt(&units, &fit, &told, &mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use pleiad_physics::Region;
 
 use crate::diagnosis::fit::{Fit, Slot, columns};
-use crate::diagnosis::held_out::{FOLDS, fold};
+use crate::diagnosis::held_out::{FEWEST_BLOCKS, FOLDS, fold};
 use crate::diagnosis::starts::Placing;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
@@ -14,8 +14,6 @@ use crate::diagnosis::white::{White, step};
 
 /// A place that fewer folds than this saw is not tried on folds: what is fitted on the others says nothing of those.
 const FEWEST_FOLDS: usize = 3;
-/// In fewer blocks than this a gain is never above two of its standard errors, however clear it is in each.
-const FEWEST_BLOCKS: usize = 10;
 
 /// How often robots were where a term acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -120,6 +120,12 @@ pub(crate) fn open(
 }
 
 impl Opened {
+    /// Whether something without a name was found of a robot in a channel.
+    pub(crate) fn shows(&self, robot: RobotId, channel: Channel) -> bool {
+        let own = self.unexplained.iter().filter(|(known, _)| *known == robot);
+        own.flat_map(|(_, target)| target.channels()).any(|(known, _)| *known == channel)
+    }
+
     /// Makes of names what cannot be told, where something unnameable shows in the same channel of the same robot
     /// and gains a good part of what they gain: the effect may be a makeshift for it.
     pub(crate) fn doubt(&self, units: &[&Unit<'_>], judgements: &mut [Judgement]) {

@@ -28,6 +28,7 @@ use std::collections::BTreeSet;
 use pleiad_estimation::RobotId;
 use pleiad_physics::Effect;
 
+use crate::channel::Channel;
 use crate::diagnosis::entries::Entries;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::held_out::Gain;
@@ -56,12 +57,14 @@ const EFFECTS: [Effect; 10] = [
     Effect::LandmarkIdentitySwap,
 ];
 
-/// Takes the entries of this stage out of those of the first, and adds what only this stage can test.
-pub(crate) fn take(entries: &mut Entries, units: &[&Unit<'_>]) -> Vec<Entry> {
+/// Takes the entries of this stage out of those of the first, and adds what only this stage can test, if it is not to
+/// be left out.
+pub(crate) fn take(entries: &mut Entries, units: &[&Unit<'_>], leave_out: &[Effect]) -> Vec<Entry> {
     let is_own = |entry: &Entry| EFFECTS.contains(&entry.0);
     let (mut own, mean): (Vec<Entry>, Vec<Entry>) = entries.entries.drain(..).partition(is_own);
     entries.entries = mean;
-    for robot in robots(units) {
+    let counted = if leave_out.contains(&Effect::EncoderCoarse) { BTreeSet::new() } else { robots(units) };
+    for robot in counted {
         let entry = (Effect::EncoderCoarse, Whose::Robot(robot));
         if ticks::recorded(&of_robot(units, robot)) && !own.contains(&entry) {
             own.push(entry);
@@ -140,10 +143,14 @@ impl Group {
         held: &[&Unit<'_>],
         fit: &Fit,
         robot: RobotId,
-        tests: usize,
+        (tests, leave_out): (usize, &[Effect]),
     ) -> Spread {
         let of_family = |build: &Build<'_>| {
-            let (own, held) = (build(units), build(held));
+            let (mut own, held) = (build(units), build(held));
+            if let Some(own) = &mut own {
+                own.members.retain(|member| !leave_out.contains(&member.effect));
+            }
+            let own = own.filter(|own| !own.members.is_empty());
             own.map_or_else(Spread::default, |own| of_family(&own, held.as_ref(), fit, robot, tests))
         };
         match self {
@@ -170,7 +177,7 @@ pub(crate) fn spread(
     fit: &Fit,
     entries: &[Entry],
     swaps: &Swaps,
-    tests: usize,
+    (tests, leave_out): (usize, &[Effect]),
 ) -> Spread {
     let has = |effect: Effect, robot: RobotId| entries.contains(&(effect, Whose::Robot(robot)));
     let mut jobs = Vec::new();
@@ -182,7 +189,7 @@ pub(crate) fn spread(
         }
     }
     let parts = parallel::map(&jobs, |&(robot, group)| {
-        group.spread(&of_robot(units, robot), &of_robot(held, robot), fit, robot, tests)
+        group.spread(&of_robot(units, robot), &of_robot(held, robot), fit, robot, (tests, leave_out))
     });
     let mut all = Spread { terms: swaps.terms(tests), ..Spread::default() };
     for part in parts {
@@ -196,6 +203,14 @@ pub(crate) fn spread(
 }
 
 impl Spread {
+    /// Whether a finding says how residuals of a robot scatter in a channel; one of sightings says it of all of them.
+    pub(crate) fn shows(&self, robot: RobotId, channel: Channel) -> bool {
+        let seen = |channel: Channel| Channel::SIGHTINGS.as_flattened().contains(&channel);
+        let found =
+            self.terms.iter().filter(|own| own.judged.verdict.is_some() && own.robots.contains(&robot));
+        found.map(|own| own.judged.channel).any(|known| known == channel || (seen(known) && seen(channel)))
+    }
+
     fn join(&mut self, other: Self) {
         self.terms.extend(other.terms);
         self.undetected.extend(other.undetected);

@@ -148,7 +148,7 @@ impl Swaps {
             if own.len() > 1 && own.len() == self.robots.values().filter(either).count() {
                 let total = own.iter().map(|swap| swap.gain.total).sum();
                 let variance: f64 = own.iter().map(|swap| swap.gain.standard_error.powi(2)).sum();
-                let gain = Gain { total, standard_error: variance.sqrt() };
+                let gain = Gain { total, standard_error: variance.sqrt(), consistent: false };
                 let p = own.iter().map(|swap| swap.p).fold(1.0, f64::min);
                 terms.push(term(
                     pair,
