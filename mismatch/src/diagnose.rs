@@ -6,6 +6,7 @@ use pleiad_physics::Effect;
 use pleiad_recording::Recording;
 
 use crate::diagnosis;
+use crate::end_points;
 use crate::error::MismatchError;
 use crate::findings::Findings;
 use crate::view::Plots;
@@ -65,5 +66,7 @@ pub struct Without {
 /// There is no recording to fit on; a recording has no nominal model, or one that lacks a robot; without
 /// ground truth nobody knows where a robot began, or a prediction is no finite number.
 pub fn diagnose(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Diagnosis, MismatchError> {
-    diagnosis::run(recordings, options)
+    let mut diagnosis = diagnosis::run(recordings, options)?;
+    end_points::add(recordings, options, &mut diagnosis)?;
+    Ok(diagnosis)
 }

@@ -17,6 +17,7 @@ mod commanded;
 mod compare;
 mod diagnose;
 mod diagnosis;
+mod end_points;
 mod error;
 mod evidence;
 mod findings;

@@ -46,9 +46,11 @@ mod unit;
 mod white;
 mod without_truth;
 
+pub(crate) use chi_square::upper_tail;
 pub use design::{Design, DesignColumn, design};
 pub use entries::composition;
 pub use explained::{Explained, Rival, Structure, explained};
 pub use known::{Interval, KnownFit, KnownParameter, acts_on_every_robot, fit_known, log_likelihood};
 pub(crate) use mesh::{LOST, STATES, about, carried, gradient};
-pub(crate) use run::run;
+pub(crate) use run::{Prepared, run};
+pub(crate) use select::familywise;

@@ -243,6 +243,11 @@ impl<'a> Prepared<'a> {
         Ok(Self { recording, evidence, models, tested: false })
     }
 
+    /// A robot with what the recording declares of it; `None` if it is not known.
+    pub(crate) fn member(&self, robot: RobotId) -> Option<Member> {
+        Some(member(self.recording, robot, self.models.get(&robot)?))
+    }
+
     /// The robots for which `wanted` holds, each by itself.
     pub(crate) fn units(&'a self, wanted: impl Fn(RobotId) -> bool) -> Vec<Unit<'a>> {
         let models = self.models.iter().filter(|(robot, _)| wanted(**robot));

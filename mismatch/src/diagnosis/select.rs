@@ -18,6 +18,11 @@ use crate::parallel;
 
 /// Probability that anything is found in a clean recording, over everything that is tried in it.
 pub(crate) const FAMILYWISE: f64 = 0.002;
+
+/// A probability among all tests, if it is small enough for a finding.
+pub(crate) fn familywise(p: f64) -> Option<f64> {
+    (p < FAMILYWISE).then_some(p)
+}
 /// An effect enters only if it gains more than this, twice in log-likelihood.
 pub(crate) const LEAST_GAIN: f64 = 20.0;
 /// A term is dropped if it is this likely without the effect.

@@ -67,7 +67,8 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
 /// Puts the manoeuvre that tells the rivals of a finding apart in the place of the catalogue's advice, as far as the
 /// recordings declare what the robots are.
 fn advise(recordings: &[Recording], findings: &mut Findings, options: &DiagnoseOptions) {
-    for finding in &mut findings.findings {
+    // What the tool itself says in words is as particular as can be.
+    for finding in findings.findings.iter_mut().filter(|finding| finding.summary.is_empty()) {
         let all = recordings.iter().find_map(|recording| proposals(recording, finding, options));
         if let (Some(all), Some(known)) = (all, &finding.manoeuvre) {
             finding.manoeuvre = Some(advice(&all, known));
