@@ -1,6 +1,8 @@
 //! Findings held against answers, by the definitions of the design: findings are matched one to one to what was
 //! injected, robots included; what is left over is extra.
 
+pub mod forms;
+
 use std::f64::consts::PI;
 
 use pleiad_estimation::geometry::wrap_angle;

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{CaseResult, Class, Effect, Group, Match, Mean, ParameterError, Row, Scored, Share};
 use crate::oracle::Known;
+use crate::score::forms;
 
 /// The tool's own name among methods.
 const TOOL: &str = "tool";
@@ -168,20 +169,33 @@ fn of_class(rows: &mut Rows<'_>, cases: &[&CaseResult]) {
             let clear = || seen().filter(|own| !own.oracle.is_reproduced());
             let wrong = |own: &CaseResult| own.tool.extra.iter().any(|said| !said.starts_with("cannot_tell"));
             rows.share(TOOL, "what remains reproduces it", seen().map(|own| own.oracle.is_reproduced()));
-            let expressed = |own: &&&CaseResult| own.tool.nameless.iter().any(|said| said.contains('['));
             rows.share(TOOL, "wrong name", clear().map(|own| wrong(own)));
             rows.share(
                 TOOL,
                 "cannot_tell, with a name in the set",
                 clear().map(|own| !wrong(own) && !own.tool.extra.is_empty()),
             );
-            rows.share(TOOL, "an expression", clear().map(|own| expressed(&own)));
-            let without = |own: &&&CaseResult| {
-                own.tool.extra.is_empty() && !own.tool.nameless.is_empty() && !expressed(own)
+            let effect =
+                |own: &CaseResult| own.tool.matches.first().and_then(|own| Effect::from_name(&own.effect));
+            let forms = |own: &CaseResult| effect(own).map_or(&[][..], forms::right);
+            let expressible = || clear().filter(|own| !forms(own).is_empty());
+            let right = |own: &CaseResult| {
+                let said = |effect| forms::is_right(effect, &own.tool.nameless);
+                own.tool.extra.is_empty() && effect(own).is_some_and(said)
             };
-            rows.share(TOOL, "unnameable", clear().map(|own| without(&own)));
+            rows.share(TOOL, "right form, of what products express", expressible().map(|own| right(own)));
+            let others = || clear().filter(|own| forms(own).is_empty());
+            let form = |own: &CaseResult| own.tool.nameless.iter().any(|said| said.starts_with("form "));
+            let shape =
+                |own: &CaseResult| own.tool.nameless.iter().any(|said| said.starts_with("unnameable "));
+            rows.share(
+                TOOL,
+                "unnameable and no more, of the others",
+                others().map(|own| own.tool.extra.is_empty() && shape(own) && !form(own)),
+            );
+            rows.share(TOOL, "a form, of the others", others().map(|own| form(own)));
             let nothing = |own: &CaseResult| own.tool.extra.is_empty() && own.tool.nameless.is_empty();
-            rows.share(TOOL, "nothing said", clear().map(|own| nothing(own)));
+            rows.share(TOOL, "nothing said, of the others", others().map(|own| nothing(own)));
         }
         Class::Unidentifiable => {
             let seen = || cases.iter().filter(|own| own.oracle.effects.iter().all(|known| known.detectable));
