@@ -54,6 +54,7 @@ pub fn right(effect: Effect) -> &'static [&'static str] {
         Effect::SensorYawMisalignment => &["bearing reading += c [rad]"],
         Effect::RangeBias => &["range reading += c [m]"],
         Effect::RangeScale => &["range reading += c r [1]"],
+        Effect::BearingDependentRangeBias => &["range reading += c b^2 [m]"],
         Effect::BearingDistortion => &["bearing reading += c b [1]", "bearing reading += c b^3 [1]"],
         Effect::CameraLatency => &[
             "bearing reading += c w [s]",
