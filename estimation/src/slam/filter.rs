@@ -225,7 +225,12 @@ impl Slam {
             let Some(choice) = associate(&candidates, self.settings.margin) else { break };
             let sighting = open.remove(choice.sighting);
             let landmark = free.remove(choice.landmark);
-            outcomes[sighting.index] = self.use_for(landmark, &sighting);
+            let outcome = self.use_for(landmark, &sighting);
+            outcomes[sighting.index] = outcome;
+            if let Outcome::Rejected { .. } = outcome {
+                // On the gate but for rounding; the landmark may be gone, and the indices with it.
+                break;
+            }
         }
         let known = self.map.len();
         for sighting in open {
