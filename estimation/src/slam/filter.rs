@@ -366,7 +366,6 @@ impl Slam {
             for track in &mut self.tracks {
                 track.kept.retain(|kept| kept.pose != oldest);
             }
-            self.tracks.retain(|track| !track.kept.is_empty());
         }
         let pose = self.state.keep_pose();
         self.poses.push(pose);
@@ -414,7 +413,10 @@ impl Slam {
             }
             keep
         });
-        self.tracks.retain(|track| track.name.is_some() || time.seconds_since(track.last_seen) <= within_s);
+        self.tracks.retain(|track| {
+            let recent = track.name.is_some() || time.seconds_since(track.last_seen) <= within_s;
+            recent && !track.kept.is_empty()
+        });
         let tracks = &self.tracks;
         self.poses.retain(|pose| {
             let waits = tracks.iter().any(|track| track.kept.iter().any(|kept| kept.pose == *pose));

@@ -110,18 +110,21 @@ impl SlamInput {
     }
 }
 
+/// A scenario's noises have to be above zero where the sensor is there: this is as good as none.
+const NEXT_TO_NOTHING: f64 = 1e-12;
+
 fn without_chance(settings: &mut RobotSettings) {
-    settings.prior.sigma_position_m = 0.0;
-    settings.prior.sigma_heading_rad = 0.0;
+    settings.prior.sigma_position_m = NEXT_TO_NOTHING;
+    settings.prior.sigma_heading_rad = NEXT_TO_NOTHING;
     let noise = &mut settings.odometry.noise;
     noise.speed_m_per_sqrt_s = 0.0;
     noise.lateral_m_per_sqrt_s = 0.0;
     noise.yaw_rad_per_sqrt_s = 0.0;
     noise.speed_m_per_sqrt_m = 0.0;
     noise.yaw_rad_per_sqrt_rad = 0.0;
-    settings.relative.sigma_range_m = 0.0;
-    settings.relative.sigma_bearing_rad = 0.0;
-    settings.relative.sigma_position_m = 0.0;
+    settings.relative.sigma_range_m = NEXT_TO_NOTHING;
+    settings.relative.sigma_bearing_rad = NEXT_TO_NOTHING;
+    settings.relative.sigma_position_m = NEXT_TO_NOTHING;
 }
 
 /// The dead reckoning of a simulated robot: the law of its simulation.

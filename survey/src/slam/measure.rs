@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use pleiad_estimation::joint::ErrorForm;
+use pleiad_estimation::motion::MotionNoise;
 use pleiad_estimation::slam::Association;
 use pleiad_estimation::statistics::{Alignment, nees};
 use pleiad_estimation::symmetric::Symmetric3;
@@ -12,11 +13,13 @@ use pleiad_sim_peers::Scenario;
 use super::input::{Luck, SlamInput};
 use super::page::LikenessSeries;
 use super::run::{Associated, Ran, RunOptions, pose_error, run, seen_map_error};
-use super::theorems::{DeterminantWatch, Likeness, OverLimit, covariance_at_truth, likeness_of, over_limit};
+use super::theorems::{DeterminantWatch, OverLimit, covariance_at_truth, likeness_of, over_limit};
 use crate::error::SurveyError;
 
 /// At which times errors are compared with their covariance, seconds.
 pub(super) const NEES_AT_S: [f64; 5] = [60.0, 120.0, 180.0, 240.0, 299.0];
+/// Length of the runs that show what correlations tend to, seconds.
+pub(super) const LONG_S: f64 = 1200.0;
 /// Between two looks at the correlations, scans.
 const LIKENESS_EVERY: usize = 8;
 /// A second landmark stands so far east of each where look-alikes are planted, metres.
@@ -37,8 +40,6 @@ pub(super) struct Nees {
 pub(super) struct Watched {
     pub ran: Ran,
     pub determinants: DeterminantWatch,
-    pub likeness: Option<Likeness>,
-    pub series: LikenessSeries,
     pub over_limit: Option<OverLimit>,
     /// At [`NEES_AT_S`]: of the pose, and of the map as the vehicle sees it.
     pub nees: Vec<[Nees; 2]>,
@@ -46,18 +47,10 @@ pub(super) struct Watched {
 
 pub(super) fn watched(input: &SlamInput, options: &RunOptions, seed: u64) -> Result<Watched, SurveyError> {
     let mut determinants = DeterminantWatch::new(seed);
-    let mut series = LikenessSeries::new();
     let mut errors = Vec::new();
-    let mut scans = 0_usize;
     let ran = run(input, options, |slam, time, births| {
         let (ids, covariance) = covariance_at_truth(slam, births, &input.landmarks);
         determinants.take(&ids, &covariance);
-        if scans.is_multiple_of(LIKENESS_EVERY)
-            && let Some(found) = likeness_of(slam)
-        {
-            series.push((time, found));
-        }
-        scans += 1;
         let due = NEES_AT_S.get(errors.len()).is_some_and(|at| time >= Timestamp::from_seconds(*at));
         if due && let Some(truth) = input.recorded.truth_at(time, 0.3) {
             let (error, covariance) = pose_error(slam, &truth);
@@ -70,8 +63,6 @@ pub(super) fn watched(input: &SlamInput, options: &RunOptions, seed: u64) -> Res
     })?;
     Ok(Watched {
         determinants,
-        likeness: likeness_of(&ran.slam),
-        series,
         over_limit: over_limit(input, &ran.slam),
         nees: errors,
         ran,
@@ -85,10 +76,41 @@ pub(super) struct Told {
     pub sigma_heading_rad: f64,
     /// Of the sensor's noise.
     pub times: f64,
+    /// What is told of the wheels.
+    pub wheels: Wheels,
+}
+
+/// What the filter is told of the noise of its motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wheels {
+    /// As the scenario says.
+    AsTheyAre,
+    /// No noise in yaw: with a known heading, the linear case.
+    ExactYaw,
+    /// No noise.
+    Exact,
 }
 
 /// A run whose estimates stay at the truth, with other noises told.
 pub(super) fn at_truth(exact: &SlamInput, told: Told, seed: u64) -> Result<Watched, SurveyError> {
+    watched(&with_told(exact, told), &RunOptions::default(), seed)
+}
+
+/// How alike the errors of the landmarks become.
+fn alike(input: &SlamInput) -> Result<LikenessSeries, SurveyError> {
+    let (mut series, mut scans) = (LikenessSeries::new(), 0_usize);
+    run(input, &RunOptions::default(), |slam, time, _| {
+        if scans.is_multiple_of(LIKENESS_EVERY)
+            && let Some(found) = likeness_of(slam)
+        {
+            series.push((time, found));
+        }
+        scans += 1;
+    })?;
+    Ok(series)
+}
+
+fn with_told(exact: &SlamInput, told: Told) -> SlamInput {
     let square = |sigma: f64| sigma * sigma;
     let position = square(told.sigma_position_m);
     let mut input = exact.clone();
@@ -96,7 +118,13 @@ pub(super) fn at_truth(exact: &SlamInput, told: Told, seed: u64) -> Result<Watch
     for noise in [&mut input.noises.range_bearing, &mut input.noises.bearing].into_iter().flatten() {
         noise.lower = noise.lower.map(|entry| entry * square(told.times));
     }
-    watched(&input, &RunOptions::default(), seed)
+    let noise = &mut input.motion.noise;
+    match told.wheels {
+        Wheels::AsTheyAre => {}
+        Wheels::ExactYaw => (noise.yaw_rad_per_sqrt_s, noise.yaw_rad_per_sqrt_rad) = (0.0, 0.0),
+        Wheels::Exact => *noise = MotionNoise::default(),
+    }
+    input
 }
 
 /// The scenario with a start and a sensor that strain the linearization: the heading known to a tenth of a radian, the
@@ -141,9 +169,11 @@ pub(super) fn ended(input: &SlamInput, options: &RunOptions) -> Result<Ended, Su
 
 /// Everything of one seed.
 pub(super) struct Measured {
-    /// At the truth, with the start as the scenario says, and with its heading known.
+    /// At the truth, as the scenario says.
     pub exact: Watched,
-    pub exact_heading_known: Watched,
+    /// At the truth, for [`LONG_S`]: with the heading known, the linear case; and as the scenario says.
+    pub linear: LikenessSeries,
+    pub turning: LikenessSeries,
     /// With chance, strained: invariant and additive.
     pub forms: [Watched; 2],
     /// Without names: as it should be, with the gate far too wide, among look-alikes.
@@ -166,16 +196,19 @@ pub(super) fn measured(scenario: &Scenario, seed: u64) -> Result<Measured, Surve
 fn of_seed(scenario: &Scenario, seed: u64) -> Result<Measured, SurveyError> {
     let simulated = |scenario: &Scenario, luck| SlamInput::simulated(scenario, seed, luck);
     let exact = simulated(scenario, Luck::None)?;
+    let long = simulated(&Scenario { duration_s: LONG_S, ..scenario.clone() }, Luck::None)?;
     let drawn = simulated(scenario, Luck::Drawn)?;
     let hard = simulated(&strained(scenario), Luck::Drawn)?;
     let twins = simulated(&with_twins(scenario), Luck::Drawn)?;
     let form = |form| RunOptions { form, ..RunOptions::default() };
     let nearest = RunOptions { association: Association::Nearest, ..RunOptions::default() };
     let bearing = RunOptions { without_ranges: true, ..RunOptions::default() };
-    let known_heading = Told { sigma_position_m: 0.1, sigma_heading_rad: 0.0, times: 1.0 };
+    let linear =
+        Told { sigma_position_m: 0.1, sigma_heading_rad: 0.0, times: 1.0, wheels: Wheels::ExactYaw };
     Ok(Measured {
         exact: watched(&exact, &RunOptions::default(), seed)?,
-        exact_heading_known: at_truth(&exact, known_heading, seed)?,
+        linear: alike(&with_told(&long, linear))?,
+        turning: alike(&long)?,
         forms: [
             watched(&hard, &form(ErrorForm::Invariant), seed)?,
             watched(&hard, &form(ErrorForm::Additive), seed)?,

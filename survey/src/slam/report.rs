@@ -67,7 +67,8 @@ fn judged(input: &SlamInput, options: &RunOptions) -> Result<Judged, SurveyError
             ));
         }
     })?;
-    let known = RunOptions { known: true, ..*options };
+    // The reference knows its landmarks by name, too.
+    let known = RunOptions { known: true, association: Association::Identity, ..*options };
     let known = run(input, &known, |_, _, _| {})?;
     let (pose_nees, map_nees) = errors.unwrap_or_default();
     Ok(Judged { ran, known, likeness, pose_nees, map_nees })

@@ -7,7 +7,7 @@ use pleiad_estimation::geometry::Vector2;
 use pleiad_estimation::joint::ErrorForm;
 use pleiad_estimation::slam::{Block, MapId, Slam, SlamState};
 use pleiad_estimation::{LandmarkId, Pose2};
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
 use super::input::SlamInput;
@@ -55,7 +55,7 @@ impl DeterminantWatch {
         subsets.push((0..count).collect());
         for subset in subsets.iter().filter(|subset| !subset.is_empty()) {
             let (then, now) = (
-                log_determinant(last, subset.iter().map(|k| rows[*k].0)),
+                log_determinant(&last, subset.iter().map(|k| rows[*k].0)),
                 log_determinant(covariance, subset.iter().map(|k| rows[*k].1)),
             );
             match then.zip(now) {
@@ -176,8 +176,8 @@ pub struct OverLimit {
     pub least: f64,
     /// Towards 1 as the map converges.
     pub greatest: f64,
-    /// Greatest excess of a landmark's standard deviation over its limit, m.
-    pub excess_sigma_m: f64,
+    /// Greatest variance of a landmark beyond its limit, in any direction, m^2.
+    pub excess_m2: f64,
     /// Mean over the landmarks of the limit's standard deviation, root of the mean over both axes, m.
     pub limit_sigma_m: f64,
     /// The same of the covariance found.
@@ -191,7 +191,7 @@ pub fn over_limit(input: &SlamInput, slam: &Slam) -> Option<OverLimit> {
     let mut found = OverLimit {
         least: f64::INFINITY,
         greatest: 0.0,
-        excess_sigma_m: 0.0,
+        excess_m2: 0.0,
         limit_sigma_m: 0.0,
         sigma_m: 0.0,
     };
@@ -204,7 +204,7 @@ pub fn over_limit(input: &SlamInput, slam: &Slam) -> Option<OverLimit> {
         let ratio = lower.solve_lower_triangular(&half.transpose())?.symmetric_eigenvalues();
         found.least = found.least.min(ratio.min());
         found.greatest = found.greatest.max(ratio.max());
-        found.excess_sigma_m = found.excess_sigma_m.max(sigma(&covariance) - sigma(&limit));
+        found.excess_m2 = found.excess_m2.max((covariance - limit).symmetric_eigenvalues().max());
         found.limit_sigma_m += sigma(&limit) / confirmed.len() as f64;
         found.sigma_m += sigma(&covariance) / confirmed.len() as f64;
     }
