@@ -40,3 +40,36 @@ fn slam(dataset: u32, options: &[&str]) -> Value {
 fn number(summary: &Value, key: &str) -> f64 {
     summary[key].as_f64().unwrap_or_else(|| panic!("no number {key} in {summary}"))
 }
+
+/// What `docs/survey/slam.md` has on record, with room for nothing but another compiler.
+#[test]
+fn mrclam_landmarks_are_mapped_by_one_robot_alone() {
+    for (dataset, map_m, way_m, known_m) in [(2, 0.127, 0.188, 0.155), (6, 0.186, 0.312, 0.315)] {
+        let run = slam(dataset, &[]);
+        for (key, expected) in [
+            ("mean_map_error_aligned_m", map_m),
+            ("mean_trajectory_error_aligned_m", way_m),
+            ("mean_trajectory_error_known_landmarks_m", known_m),
+        ] {
+            let found = number(&run, key);
+            assert!(
+                (found - expected).abs() < 0.002,
+                "dataset {dataset}, {key}: {found}, on record {expected}"
+            );
+        }
+        let robots = run["robots"].as_array().expect("a list");
+        assert_eq!(robots.len(), 5);
+        for robot in robots {
+            assert!(robot["landmarks"].as_u64() >= Some(14), "{robot}");
+            assert_eq!(robot["associated"]["wrong"], 0, "names cannot be mistaken");
+        }
+    }
+}
+
+#[test]
+fn mrclam_without_names_makes_mistakes_and_they_are_counted() {
+    let run = slam(6, &["--association", "nearest", "--robot", "2"]);
+    let associated = &run["robots"][0]["associated"];
+    assert!(associated["wrong"].as_u64() > Some(100), "{run}");
+    assert!(number(&run, "mean_map_error_aligned_m") > 0.5);
+}

@@ -234,8 +234,11 @@ impl Slam {
         }
         let known = self.map.len();
         for sighting in open {
-            outcomes[sighting.index] =
-                if self.apart(&sighting, known) { self.found(time, None, &sighting) } else { Outcome::Ambiguous };
+            outcomes[sighting.index] = if self.apart(&sighting, known) {
+                self.found(time, None, &sighting)
+            } else {
+                Outcome::Ambiguous
+            };
         }
     }
 
@@ -262,14 +265,21 @@ impl Slam {
         self.map.iter().take(known).all(|entry| {
             let innovation =
                 self.state.innovation(SlamState::VEHICLE, entry.block, &seen.relative, &seen.noise);
-            innovation.map_or(true, |innovation| innovation.nis > self.settings.apart[innovation.dimension - 1])
+            innovation
+                .map_or(true, |innovation| innovation.nis > self.settings.apart[innovation.dimension - 1])
         })
     }
 
     fn use_for(&mut self, known: usize, sighting: &Open) -> Outcome {
         let MapEntry { id: landmark, block, .. } = self.map[known];
         let dimension = crate::measurement::dimension(&sighting.relative);
-        let update = self.state.update(SlamState::VEHICLE, block, &sighting.relative, &sighting.noise, &self.settings.gate);
+        let update = self.state.update(
+            SlamState::VEHICLE,
+            block,
+            &sighting.relative,
+            &sighting.noise,
+            &self.settings.gate,
+        );
         match update {
             Ok(Update::Used { nis }) => {
                 let entry = &mut self.map[known];
@@ -309,15 +319,19 @@ impl Slam {
     }
 
     /// A bearing of a landmark that is not in the map: crossed with one kept, kept, or let go.
-    fn wait(&mut self, time: Timestamp, name: Option<LandmarkId>, bearing_rad: f64, noise: &Noise) -> Outcome {
+    fn wait(
+        &mut self,
+        time: Timestamp,
+        name: Option<LandmarkId>,
+        bearing_rad: f64,
+        noise: &Noise,
+    ) -> Outcome {
         let rules = self.settings.delayed;
         let vehicle = self.state.vehicle();
         let slack_rad = 3.0 * libm::sqrt(noise.lower[0]);
         let fits = |track: &&BearingTrack| match name {
             Some(_) => track.name == name,
-            None => {
-                track.last_seen < time && track.misfit_rad(&vehicle, bearing_rad, &rules) <= slack_rad
-            }
+            None => track.last_seen < time && track.misfit_rad(&vehicle, bearing_rad, &rules) <= slack_rad,
         };
         let mut fitting = self.tracks.iter().enumerate().filter(|(_, track)| fits(track));
         let (found, other) = (fitting.next().map(|(index, _)| index), fitting.next());
@@ -327,8 +341,7 @@ impl Slam {
         if let Some(index) = found {
             self.tracks[index].last = (vehicle, bearing_rad);
             self.tracks[index].last_seen = time;
-            if let Some((best, landmark)) =
-                self.tracks[index].cross(&self.state, bearing_rad, noise, &rules)
+            if let Some((best, landmark)) = self.tracks[index].cross(&self.state, bearing_rad, noise, &rules)
             {
                 return self.crossed(time, index, best, &landmark, noise);
             }

@@ -44,8 +44,12 @@ fn new_landmarks_have_the_derivatives_of_central_differences() {
     let rb = Noise::from_sigmas(&[0.1, 0.02]);
     let one = Noise::from_sigmas(&[0.02]);
     let single = |a: &Pose2| {
-        from_one(&Sight { observer: *a, relative: range_bearing(&Pose2::new(3.0, -2.0, 0.4), point), noise: rb })
-            .unwrap()
+        from_one(&Sight {
+            observer: *a,
+            relative: range_bearing(&Pose2::new(3.0, -2.0, 0.4), point),
+            noise: rb,
+        })
+        .unwrap()
     };
     let (first, second) = (bearing(&a, point), bearing(&b, point));
     let pair = |a: &Pose2, b: &Pose2| {
@@ -167,7 +171,8 @@ fn an_update_is_that_of_a_dense_kalman_filter() {
                     }
                 }
             };
-            let Relative::RangeBearing { range_m, bearing_rad } = range_bearing(&moved(0), moved(2).position())
+            let Relative::RangeBearing { range_m, bearing_rad } =
+                range_bearing(&moved(0), moved(2).position())
             else {
                 unreachable!()
             };
@@ -236,7 +241,9 @@ fn parked(form: ErrorForm) -> (Symmetric3, Symmetric3, SlamState, Block) {
     for _ in 0..500 {
         // What the true vehicle sees; it is where it was told.
         let from = Pose2::new(2.0, 1.0, 0.3);
-        let Relative::RangeBearing { range_m, bearing_rad } = range_bearing(&from, point) else { unreachable!() };
+        let Relative::RangeBearing { range_m, bearing_rad } = range_bearing(&from, point) else {
+            unreachable!()
+        };
         let relative = Relative::RangeBearing {
             range_m: range_m + 0.17 * noise(&mut random),
             bearing_rad: bearing_rad + 0.035 * noise(&mut random),
@@ -268,8 +275,14 @@ fn a_pose_that_is_kept_is_the_vehicle_and_one_that_is_removed_leaves_no_trace() 
         let (mut state, blocks) = state(form);
         let before = published(&state, &blocks);
         let past = state.keep_pose();
-        assert_eq!(state.error_covariance(past, past), state.error_covariance(SlamState::VEHICLE, SlamState::VEHICLE));
-        assert_eq!(state.error_covariance(past, blocks[1]), state.error_covariance(SlamState::VEHICLE, blocks[1]));
+        assert_eq!(
+            state.error_covariance(past, past),
+            state.error_covariance(SlamState::VEHICLE, SlamState::VEHICLE)
+        );
+        assert_eq!(
+            state.error_covariance(past, blocks[1]),
+            state.error_covariance(SlamState::VEHICLE, blocks[1])
+        );
         state.remove(past);
         assert_eq!(published(&state, &blocks), before);
         let again = state.insert_known(Vector2::new(1.0, 1.0));
@@ -287,11 +300,8 @@ fn drive(slam: &mut Slam, truth: &mut Pose2, motion: Vector3) {
 fn a_landmark_of_bearings_is_founded_once_they_cross_and_not_before() {
     for form in FORMS {
         let mut truth = Pose2::identity();
-        let mut slam = Slam::new(
-            SlamSettings::new(form, noises()),
-            truth,
-            Symmetric3::diagonal(1e-4, 1e-4, 1e-5),
-        );
+        let mut slam =
+            Slam::new(SlamSettings::new(form, noises()), truth, Symmetric3::diagonal(1e-4, 1e-4, 1e-5));
         let point = Vector2::new(6.0, 8.0);
         let (mut random, mut founded_at) = (3, None);
         for k in 0..40 {

@@ -38,7 +38,10 @@ pub fn run(args: &SlamArgs) -> anyhow::Result<()> {
 
 fn of_scenario(args: &SlamArgs, options: RunOptions) -> anyhow::Result<SlamPage> {
     if args.robot.is_some() || args.noise.is_some() || args.seconds.is_some() || args.start != 0.0 {
-        bail!("--robot, --noise, --start and --seconds are of recordings; {} is a scenario", args.input.display());
+        bail!(
+            "--robot, --noise, --start and --seconds are of recordings; {} is a scenario",
+            args.input.display()
+        );
     }
     let scenario = Scenario::load(&args.input)?;
     let seeds = usize::try_from(args.seeds).context("--seeds")?;
@@ -78,14 +81,15 @@ fn of_recording(args: &SlamArgs, options: &RunOptions) -> anyhow::Result<SlamPag
     for (robot, agent) in team.agents.iter().filter(|(robot, _)| asked.is_none_or(|asked| asked == **robot)) {
         let node = agent.node()?;
         let Some(prior) = &node.prior else {
-            bail!("robot {robot} has no ground truth to start from, and the recording does not say where it started");
+            bail!(
+                "robot {robot} has no ground truth to start from, and the recording does not say where it started"
+            );
         };
         let [_, relative_position, range, bearing, range_bearing, ..] = node.sensors.profiles();
         let samples = team.samples.get(robot).into_iter().flatten();
         // Each robot is alone here: what it sees of the others is left out.
-        let own = samples.filter(|sample| {
-            !matches!(sample.reading, Reading::Sighting { target: Target::Robot(_), .. })
-        });
+        let own = samples
+            .filter(|sample| !matches!(sample.reading, Reading::Sighting { target: Target::Robot(_), .. }));
         inputs.push(SlamInput {
             robot: *robot,
             motion: node.motion,

@@ -54,19 +54,15 @@ pub(super) fn watched(input: &SlamInput, options: &RunOptions, seed: u64) -> Res
         let due = NEES_AT_S.get(errors.len()).is_some_and(|at| time >= Timestamp::from_seconds(*at));
         if due && let Some(truth) = input.recorded.truth_at(time, 0.3) {
             let (error, covariance) = pose_error(slam, &truth);
-            let of = |sum: Option<f64>, dimension: usize| Nees { sum: sum.unwrap_or(f64::INFINITY), dimension };
+            let of =
+                |sum: Option<f64>, dimension: usize| Nees { sum: sum.unwrap_or(f64::INFINITY), dimension };
             let pose = of(nees(&error, &covariance), error.len());
             let map = seen_map_error(slam, &truth, births, &input.landmarks)
                 .map_or_else(Nees::default, |(error, covariance)| of(nees(&error, &covariance), error.len()));
             errors.push([pose, map]);
         }
     })?;
-    Ok(Watched {
-        determinants,
-        over_limit: over_limit(input, &ran.slam),
-        nees: errors,
-        ran,
-    })
+    Ok(Watched { determinants, over_limit: over_limit(input, &ran.slam), nees: errors, ran })
 }
 
 /// A start and a sensor that the filter is told of, where nothing is drawn.
@@ -142,8 +138,11 @@ pub(super) fn strained(scenario: &Scenario) -> Scenario {
 /// The scenario with a second landmark beside every one.
 pub(super) fn with_twins(scenario: &Scenario) -> Scenario {
     let mut twins = scenario.clone();
-    let second: BTreeMap<LandmarkId, [f64; 2]> =
-        scenario.landmarks.iter().map(|(id, [x, y])| (LandmarkId(id.0 + TWIN_IDS), [x + TWIN_M, *y])).collect();
+    let second: BTreeMap<LandmarkId, [f64; 2]> = scenario
+        .landmarks
+        .iter()
+        .map(|(id, [x, y])| (LandmarkId(id.0 + TWIN_IDS), [x + TWIN_M, *y]))
+        .collect();
     twins.landmarks.extend(second);
     twins
 }
@@ -203,8 +202,7 @@ fn of_seed(scenario: &Scenario, seed: u64) -> Result<Measured, SurveyError> {
     let form = |form| RunOptions { form, ..RunOptions::default() };
     let nearest = RunOptions { association: Association::Nearest, ..RunOptions::default() };
     let bearing = RunOptions { without_ranges: true, ..RunOptions::default() };
-    let linear =
-        Told { sigma_position_m: 0.1, sigma_heading_rad: 0.0, times: 1.0, wheels: Wheels::ExactYaw };
+    let linear = Told { sigma_position_m: 0.1, sigma_heading_rad: 0.0, times: 1.0, wheels: Wheels::ExactYaw };
     Ok(Measured {
         exact: watched(&exact, &RunOptions::default(), seed)?,
         linear: alike(&with_told(&long, linear))?,

@@ -2,9 +2,7 @@
 
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{Pose2, Timestamp, geometry::wrap_angle};
-use pleiad_report::{
-    Axis, CONFIDENCE_95_TWO_DIMENSIONS, Colour, Dash, Figure, Trace, ellipse_points,
-};
+use pleiad_report::{Axis, CONFIDENCE_95_TWO_DIMENSIONS, Colour, Dash, Figure, Trace, ellipse_points};
 
 use super::input::SlamInput;
 use super::run::{Moment, Ran};
@@ -40,12 +38,8 @@ pub fn map_figure(input: &SlamInput, ran: &Ran, aligned: &Pose2) -> Figure {
         .iter()
         .map(|moment| moment.truth.map_or([f64::NAN; 2], |pose| [pose.x_m(), pose.y_m()]))
         .collect();
-    let estimate: Vec<[f64; 2]> = ran
-        .moments
-        .iter()
-        .map(|moment| aligned.act(moment.pose.position()))
-        .map(|p| [p.x, p.y])
-        .collect();
+    let estimate: Vec<[f64; 2]> =
+        ran.moments.iter().map(|moment| aligned.act(moment.pose.position())).map(|p| [p.x, p.y]).collect();
     let known: Vec<[f64; 2]> = input.landmarks.values().copied().collect();
     let mapped: Vec<[f64; 2]> =
         ran.map.iter().map(|mapped| aligned.act(mapped.position)).map(|p| [p.x, p.y]).collect();
@@ -77,11 +71,27 @@ pub fn map_figure(input: &SlamInput, ran: &Ran, aligned: &Pose2) -> Figure {
     let axis = |name: &str, k: usize| Axis::new(name, "m").range(low[k] - room, high[k] + room);
     Figure::new(axis("x", 0), axis("y", 1))
         .equal_aspect()
-        .trace(Trace::path("true way", &column(&truth, 0), &column(&truth, 1), Colour::Muted).dash(Dash::Dash))
+        .trace(
+            Trace::path("true way", &column(&truth, 0), &column(&truth, 1), Colour::Muted).dash(Dash::Dash),
+        )
         .trace(Trace::path("estimated way", &column(&estimate, 0), &column(&estimate, 1), Colour::Series(0)))
         .trace(Trace::polygons("95 % ellipse", &outlines, Colour::Series(1)))
-        .trace(Trace::markers("true landmark", &column(&known, 0), &column(&known, 1), Colour::Ink, "diamond-open", 9.0))
-        .trace(Trace::markers("estimated landmark", &column(&mapped, 0), &column(&mapped, 1), Colour::Series(1), "x", 6.0))
+        .trace(Trace::markers(
+            "true landmark",
+            &column(&known, 0),
+            &column(&known, 1),
+            Colour::Ink,
+            "diamond-open",
+            9.0,
+        ))
+        .trace(Trace::markers(
+            "estimated landmark",
+            &column(&mapped, 0),
+            &column(&mapped, 1),
+            Colour::Series(1),
+            "x",
+            6.0,
+        ))
 }
 
 /// Standard deviation of every landmark and of the vehicle over time, and what the landmarks' cannot fall below.
@@ -97,7 +107,8 @@ pub fn sigma_figure(ran: &Ran, limit_m: Option<f64>) -> Figure {
             moment.sigma_m.iter().find(|(other, _)| other == id).map_or(f64::NAN, |(_, sigma)| *sigma)
         };
         let values: Vec<f64> = ran.moments.iter().map(sigma).collect();
-        let mut trace = Trace::line("landmarks", &time, &values, Colour::Series(1)).width(1.0).group("landmarks");
+        let mut trace =
+            Trace::line("landmarks", &time, &values, Colour::Series(1)).width(1.0).group("landmarks");
         if k > 0 {
             trace = trace.unlisted();
         }
@@ -110,8 +121,8 @@ pub fn sigma_figure(ran: &Ran, limit_m: Option<f64>) -> Figure {
         .collect();
     figure = figure.trace(Trace::line("vehicle", &time, &vehicle, Colour::Series(0)));
     if let (Some(limit_m), Some(first), Some(last)) = (limit_m, time.first(), time.last()) {
-        let trace =
-            Trace::line("mean limit of the landmarks", &[*first, *last], &[limit_m; 2], Colour::Ink).dash(Dash::Dash);
+        let trace = Trace::line("mean limit of the landmarks", &[*first, *last], &[limit_m; 2], Colour::Ink)
+            .dash(Dash::Dash);
         figure = figure.trace(trace);
     }
     figure
@@ -125,14 +136,29 @@ pub fn likeness_figure(series: &LikenessSeries) -> Figure {
     Figure::new(Axis::new("time", "s"), Axis::new("least correlation", "-"))
         .row(Axis::new("greatest sigma", "m").logarithmic())
         .height(520)
-        .trace(Trace::line("correlation of two landmarks", &time, &column(|l| l.least_correlation), Colour::Series(0)))
+        .trace(Trace::line(
+            "correlation of two landmarks",
+            &time,
+            &column(|l| l.least_correlation),
+            Colour::Series(0),
+        ))
         .trace(
-            Trace::line("difference of two landmarks", &time, &column(|l| l.relative_sigma_m), Colour::Series(1))
-                .in_row(1),
+            Trace::line(
+                "difference of two landmarks",
+                &time,
+                &column(|l| l.relative_sigma_m),
+                Colour::Series(1),
+            )
+            .in_row(1),
         )
         .trace(
-            Trace::line("distance of two landmarks", &time, &column(|l| l.distance_sigma_m), Colour::Series(2))
-                .in_row(1),
+            Trace::line(
+                "distance of two landmarks",
+                &time,
+                &column(|l| l.distance_sigma_m),
+                Colour::Series(2),
+            )
+            .in_row(1),
         )
 }
 

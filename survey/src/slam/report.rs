@@ -142,17 +142,26 @@ fn figures(input: &SlamInput, judged: &Judged, aligned: &Pose2, whose: &str) -> 
     vec![
         Shown::Figure(
             map_figure(input, ran, aligned),
-            format!("{whose}: the map and the way, {moved}. Ellipses hold 95 %; their common part is what the start was not known by."),
+            format!(
+                "{whose}: the map and the way, {moved}. Ellipses hold 95 %; their common part is what the start was not known by."
+            ),
         ),
         Shown::Figure(
             sigma_figure(ran, limit_m),
-            format!("{whose}: every landmark's standard deviation falls towards what the vehicle's first covariance leaves it."),
+            format!(
+                "{whose}: every landmark's standard deviation falls towards what the vehicle's first covariance leaves it."
+            ),
         ),
         Shown::Figure(
             likeness_figure(&judged.likeness),
-            format!("{whose}: errors of the landmarks become one error. Jumps are landmarks that enter the map."),
+            format!(
+                "{whose}: errors of the landmarks become one error. Jumps are landmarks that enter the map."
+            ),
         ),
-        Shown::Figure(error_figure(ran), format!("{whose}: errors of the vehicle with three standard deviations.")),
+        Shown::Figure(
+            error_figure(ran),
+            format!("{whose}: errors of the vehicle with three standard deviations."),
+        ),
     ]
 }
 
@@ -171,7 +180,11 @@ pub fn on_scenario(scenario: &Scenario, asked: &Asked) -> Result<SlamPage, Surve
         let input = SlamInput::simulated(scenario, seed, Luck::Drawn)?;
         let judged = judged(&input, &asked.options)?;
         let numbers = numbers(&input, &judged);
-        Ok::<_, SurveyError>((numbers, judged.ran.associated, (seed == first_seed).then_some((input, judged))))
+        Ok::<_, SurveyError>((
+            numbers,
+            judged.ran.associated,
+            (seed == first_seed).then_some((input, judged)),
+        ))
     })?;
     let mut text = format!("{}: {} seeds from {first_seed}\n\n", scenario.name, seeds.len());
     let mut table = Table::new(
@@ -187,7 +200,11 @@ pub fn on_scenario(scenario: &Scenario, asked: &Asked) -> Result<SlamPage, Surve
         ("error of the map moved as a whole, m", "map_error_aligned_m", 3),
         ("NIS per degree of freedom", "nis_per_dof", 3),
         ("NEES of the pose at the end, per degree of freedom", "pose_nees_per_dof_at_end", 2),
-        ("NEES of the map as the vehicle sees it, at the end, per degree of freedom", "map_nees_per_dof_at_end", 2),
+        (
+            "NEES of the map as the vehicle sees it, at the end, per degree of freedom",
+            "map_nees_per_dof_at_end",
+            2,
+        ),
         ("standard deviation of a landmark at the end, m", "landmark_sigma_at_end_m", 4),
         ("its limit, m", "landmark_sigma_limit_m", 4),
         ("least covariance over its limit", "least_over_limit", 4),
@@ -259,8 +276,18 @@ pub fn on_recording(name: &str, inputs: &[SlamInput], options: &RunOptions) -> R
         Ok::<_, SurveyError>((numbers(input, &judged), judged))
     })?;
     let header = [
-        "robot", "landmarks", "map m", "map moved m", "way m", "way moved m", "known map: way m", "NIS", "right",
-        "wrong", "twice", "rejected",
+        "robot",
+        "landmarks",
+        "map m",
+        "map moved m",
+        "way m",
+        "way moved m",
+        "known map: way m",
+        "NIS",
+        "right",
+        "wrong",
+        "twice",
+        "rejected",
     ];
     let mut table = Table::new(
         "Every robot alone. Root mean square errors; moved: after the motion of the whole that fits best. Known map: the same \
@@ -299,7 +326,13 @@ pub fn on_recording(name: &str, inputs: &[SlamInput], options: &RunOptions) -> R
         shown.extend(figures(input, judged, &alignment(&judged.ran), &format!("Robot {}", input.robot)));
     }
     let mut summary = Map::new();
-    let keys = ["map_error_m", "map_error_aligned_m", "trajectory_error_m", "trajectory_error_aligned_m", "trajectory_error_known_landmarks_m"];
+    let keys = [
+        "map_error_m",
+        "map_error_aligned_m",
+        "trajectory_error_m",
+        "trajectory_error_aligned_m",
+        "trajectory_error_known_landmarks_m",
+    ];
     for key in keys {
         let values: Vec<f64> =
             all.iter().filter_map(|(numbers, _)| numbers.get(key).and_then(Value::as_f64)).collect();

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 use pleiad_estimation::geometry::{Matrix3, Vector2, wrap_angle};
 use pleiad_estimation::joint::ErrorForm;
-use pleiad_estimation::slam::{Association, MapEntry, MapId, Outcome, ScanOutcome, Slam, SlamRun, SlamSettings, SlamState};
+use pleiad_estimation::slam::{
+    Association, MapEntry, MapId, Outcome, ScanOutcome, Slam, SlamRun, SlamSettings, SlamState,
+};
 use pleiad_estimation::statistics::{Alignment, PosePair, absolute_trajectory_error, nees};
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{LandmarkId, Pose2, Timestamp};
@@ -330,10 +332,9 @@ pub fn seen_map_error(
             let l = slam.position(entry);
             match state.form() {
                 ErrorForm::Invariant => (turn_back(lever(l)), turn_back(-lever(l))),
-                ErrorForm::Additive => (
-                    turn_back(lever(Vector2::zeros())),
-                    turn_back(-lever(l - estimate.position())),
-                ),
+                ErrorForm::Additive => {
+                    (turn_back(lever(Vector2::zeros())), turn_back(-lever(l - estimate.position())))
+                }
             }
         })
         .collect();

@@ -188,13 +188,8 @@ pub struct OverLimit {
 pub fn over_limit(input: &SlamInput, slam: &Slam) -> Option<OverLimit> {
     let state: &SlamState = slam.state();
     let confirmed: Vec<_> = slam.map().iter().filter(|entry| entry.confirmed).collect();
-    let mut found = OverLimit {
-        least: f64::INFINITY,
-        greatest: 0.0,
-        excess_m2: 0.0,
-        limit_sigma_m: 0.0,
-        sigma_m: 0.0,
-    };
+    let mut found =
+        OverLimit { least: f64::INFINITY, greatest: 0.0, excess_m2: 0.0, limit_sigma_m: 0.0, sigma_m: 0.0 };
     let sigma = |m: &Matrix2<f64>| (0.5 * m.trace()).sqrt();
     for entry in &confirmed {
         let limit = limit(input, &input.start, slam.position(entry));
