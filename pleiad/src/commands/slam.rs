@@ -1,5 +1,7 @@
 //! `pleiad slam`: vehicle and map at once, on a scenario or on a recording.
 
+use std::fmt::Write as _;
+
 use anyhow::{Context, bail};
 use pleiad_estimation::RobotId;
 use pleiad_estimation::joint::ErrorForm;
@@ -105,7 +107,7 @@ fn of_recording(args: &SlamArgs, options: &RunOptions) -> anyhow::Result<SlamPag
     let mut page = on_recording(&recording.name, &inputs, options)?;
     spinner.finish_and_clear();
     for note in &team.notes {
-        page.text.push_str(&format!("note: {note}\n"));
+        let _ = writeln!(page.text, "note: {note}");
     }
     Ok(page)
 }
