@@ -155,7 +155,9 @@ fn figures(input: &SlamInput, judged: &Judged, aligned: &Pose2, whose: &str) -> 
         Shown::Figure(
             likeness_figure(&judged.likeness),
             format!(
-                "{whose}: errors of the landmarks become one error. Jumps are landmarks that enter the map."
+                "{whose}: errors of the landmarks become one error, a shift and a turn of the whole map. A turn moves \
+                 opposite landmarks opposite ways, so that coordinates may be anticorrelated; the distance of two landmarks is free \
+                 of it. Jumps are landmarks that enter the map."
             ),
         ),
         Shown::Figure(
