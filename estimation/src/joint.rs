@@ -342,7 +342,7 @@ pub(crate) fn extrapolate(
 }
 
 /// `[I, J (p_new - p_last)]`: the textbook transition from a robot's last event to `pose`.
-fn additive_transition(last: &Pose2, pose: &Pose2) -> Matrix3 {
+pub(crate) fn additive_transition(last: &Pose2, pose: &Pose2) -> Matrix3 {
     let moved = pose.position() - last.position();
     Matrix3::new(1.0, 0.0, -moved.y, 0.0, 1.0, moved.x, 0.0, 0.0, 1.0)
 }

@@ -19,6 +19,7 @@ pub mod nominal;
 pub mod observability;
 pub mod reference;
 pub mod sample;
+pub mod slam;
 pub mod statistics;
 pub mod strategy;
 pub mod symmetric;

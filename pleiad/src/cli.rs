@@ -1,5 +1,6 @@
 //! The command line, as clap sees it.
 
+mod slam;
 mod survey;
 mod values;
 
@@ -10,6 +11,7 @@ use pleiad_benchmark::Asked;
 use pleiad_estimation::strategy::StrategyKind;
 use pleiad_sim_peers::scenario::ManoeuvreKind;
 
+pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
 pub use values::{AbsoluteArg, LandmarksArg};
 
@@ -42,6 +44,8 @@ pub enum Command {
     Faults(FaultsArgs),
     /// The systems that the joint filter grew from, each as a study with its claims: Kalman filter, gyro, rover and others.
     Survey(SurveyArgs),
+    /// Vehicle and map at once: EKF SLAM on a scenario or a recording.
+    Slam(SlamArgs),
     /// The physics a simulation can leave out: names, parameters, equations.
     Effects(EffectsArgs),
     /// One robot's agent.

@@ -6,6 +6,7 @@
 
 mod error;
 mod monte_carlo;
+pub mod slam;
 mod study;
 
 pub use error::SurveyError;
@@ -13,4 +14,8 @@ pub use monte_carlo::{Estimate, over_seeds, share};
 pub use study::{Claim, Known, Shown, Study, StudyOptions};
 
 /// The studies of `pleiad survey`, in the order of the survey's sections.
-pub const STUDIES: &[Known] = &[];
+pub const STUDIES: &[Known] = &[Known {
+    name: "slam",
+    about: "EKF SLAM: what a map converges to, what the choice of the error does to it, association, bearings alone",
+    run: slam::study,
+}];

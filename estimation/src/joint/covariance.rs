@@ -46,7 +46,7 @@ impl Prepared {
 
 impl JointCovariance {
     /// From a packed lower triangle; `None` if its length does not fit.
-    pub(super) fn from_lower(size: usize, lower: Vec<f64>) -> Option<Self> {
+    pub(crate) fn from_lower(size: usize, lower: Vec<f64>) -> Option<Self> {
         (lower.len() == size * (size + 1) / 2).then_some(Self { size, lower })
     }
 
@@ -76,13 +76,13 @@ impl JointCovariance {
         (0..self.size).map(|row| (0..self.size).map(|column| self.entry(row, column)).collect()).collect()
     }
 
-    pub(super) fn grow(&mut self) {
+    pub(crate) fn grow(&mut self) {
         self.size += 3;
         self.lower.resize(self.size * (self.size + 1) / 2, 0.0);
     }
 
     /// Marginalizes a robot: its rows and columns become zero.
-    pub(super) fn clear(&mut self, index: usize) {
+    pub(crate) fn clear(&mut self, index: usize) {
         for row in 0..self.size {
             for column in 0..=row {
                 if row / 3 == index || column / 3 == index {
@@ -92,12 +92,23 @@ impl JointCovariance {
         }
     }
 
-    pub(super) fn set_diagonal(&mut self, index: usize, block: Symmetric3) {
+    pub(crate) fn set_diagonal(&mut self, index: usize, block: Symmetric3) {
         self.for_diagonal(index, |entry, value| *entry = value, block);
     }
 
-    pub(super) fn add_diagonal(&mut self, index: usize, block: Symmetric3) {
+    pub(crate) fn add_diagonal(&mut self, index: usize, block: Symmetric3) {
         self.for_diagonal(index, |entry, value| *entry += value, block);
+    }
+
+    /// Sets the 3x3 block of two different robots, and its mirror image with it.
+    pub(crate) fn set_cross(&mut self, i: usize, j: usize, block: &Matrix3) {
+        for row in 0..3 {
+            for column in 0..3 {
+                let (a, b) = (3 * i + row, 3 * j + column);
+                let (a, b) = if a >= b { (a, b) } else { (b, a) };
+                self.lower[a * (a + 1) / 2 + b] = block[(row, column)];
+            }
+        }
     }
 
     fn for_diagonal(&mut self, index: usize, change: impl Fn(&mut f64, f64), block: Symmetric3) {
@@ -112,23 +123,17 @@ impl JointCovariance {
     }
 
     /// `P_ii <- F P_ii F^T`, `P_ij <- F P_ij` for one robot.
-    pub(super) fn transform(&mut self, index: usize, f: &Matrix3) {
+    pub(crate) fn transform(&mut self, index: usize, f: &Matrix3) {
         for other in (0..self.size / 3).filter(|other| *other != index) {
             let block = f * self.block(index, other);
-            for row in 0..3 {
-                for column in 0..3 {
-                    let (i, j) = (3 * index + row, 3 * other + column);
-                    let (i, j) = if i >= j { (i, j) } else { (j, i) };
-                    self.lower[i * (i + 1) / 2 + j] = block[(row, column)];
-                }
-            }
+            self.set_cross(index, other, &block);
         }
         let own = Symmetric3::from_lower(&self.block(index, index)).congruence(f);
         self.set_diagonal(index, own);
     }
 
     /// Prepares an update; `None` if the innovation covariance is not positive definite.
-    pub(super) fn prepare(
+    pub(crate) fn prepare(
         &self,
         dimension: usize,
         innovation: &Vector3,
@@ -195,7 +200,7 @@ impl JointCovariance {
     }
 
     /// `P <- P - V V^T`, lower triangle, row by row.
-    pub(super) fn downdate(&mut self, prepared: &Prepared) {
+    pub(crate) fn downdate(&mut self, prepared: &Prepared) {
         let [a, b, c] = &prepared.columns;
         let mut start = 0;
         for row in 0..self.size {

@@ -27,7 +27,7 @@ pub struct Noises {
 }
 
 impl Noises {
-    pub(super) fn of(&self, relative: &Relative) -> Result<Noise, SampleRefusal> {
+    pub(crate) fn of(&self, relative: &Relative) -> Result<Noise, SampleRefusal> {
         let (kind, noise) = match relative {
             Relative::Pose(_) => ("relative_pose", self.relative_pose),
             Relative::Position { .. } => ("relative_position", self.relative_position),

@@ -15,6 +15,7 @@ mod runner;
 mod shells;
 mod sim_peers;
 mod simulate;
+mod slam;
 mod study;
 mod survey;
 
@@ -33,6 +34,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Benchmark(Benchmark::Concealed(args)) => concealed::run(&args),
         Command::Faults(args) => faults::run(&args),
+        Command::Slam(args) => slam::run(&args),
         Command::Survey(args) => survey::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Agent(args) => agent::run(&args),

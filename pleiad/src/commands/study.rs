@@ -13,15 +13,21 @@ use crate::output;
 /// Writes `report.html` and `summary.json` into the folder and prints the study. An error if a claim does not hold:
 /// a script should notice.
 pub fn finish(study: &Study, out: &Path, as_json: bool, command: &str) -> anyhow::Result<()> {
-    let summary = summary(study);
-    write_summary(&out.join("summary.json"), &summary)?;
-    page(study, command).write(&out.join("report.html"))?;
+    let summary = write(study, out, command)?;
     output::print(as_json, &summary, &text(study, out))?;
     let failed = study.claims.iter().filter(|claim| !claim.holds).count();
     if failed > 0 {
         bail!("{}: {failed} of {} claims do not hold", study.name, study.claims.len());
     }
     Ok(())
+}
+
+/// Writes `report.html` and `summary.json` into the folder, and gives what is in the second.
+pub fn write(study: &Study, out: &Path, command: &str) -> anyhow::Result<Value> {
+    let summary = summary(study);
+    write_summary(&out.join("summary.json"), &summary)?;
+    page(study, command).write(&out.join("report.html"))?;
+    Ok(summary)
 }
 
 fn summary(study: &Study) -> Value {

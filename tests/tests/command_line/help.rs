@@ -2,7 +2,7 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "demo",
     "run",
     "replay",
@@ -11,6 +11,7 @@ const COMMANDS: [&str; 14] = [
     "diagnose",
     "benchmark",
     "faults",
+    "slam",
     "effects",
     "agent",
     "coordinator",

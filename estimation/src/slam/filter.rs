@@ -1,0 +1,442 @@
+//! The filter: scans of sightings into a map.
+
+use super::associate::{Candidate, associate};
+use super::bearings::{BearingTrack, DelayedRules, KeptBearing};
+use super::initialize::{Sight, from_one};
+use super::state::{Block, SlamState};
+use crate::fact::Noise;
+use crate::geometry::Vector2;
+use crate::joint::{ErrorForm, Update};
+use crate::sample::{Relative, SampleRefusal};
+use crate::strategy::Noises;
+use crate::symmetric::Symmetric3;
+use crate::{LandmarkId, Pose2, Timestamp};
+
+/// How sightings find their landmarks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Association {
+    /// By the names they carry.
+    #[default]
+    Identity,
+    /// By what they measure alone: nearest neighbour.
+    Nearest,
+}
+
+/// How a map is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlamSettings {
+    /// In which coordinates errors are Gaussian.
+    pub form: ErrorForm,
+    /// How well is measured.
+    pub noises: Noises,
+    /// How sightings find their landmarks.
+    pub association: Association,
+    /// Largest NIS with which a sighting is used, by dimension.
+    pub gate: [f64; 3],
+    /// A sighting founds a landmark if its NIS with every known one is above this, by dimension; what lies between
+    /// the gate and this is neither. Not used where sightings carry names.
+    pub apart: [f64; 3],
+    /// The second best explanation of a sighting has to be worse by this (NIS plus log-determinant).
+    pub margin: f64,
+    /// A landmark is confirmed when it has been seen so often; before that, a sighting of its name that does not fit
+    /// removes it.
+    pub confirm_sightings: u32,
+    /// A nameless landmark that is not confirmed within so many seconds is forgotten.
+    pub confirm_within_s: f64,
+    /// When bearings make a landmark.
+    pub delayed: DelayedRules,
+}
+
+impl SlamSettings {
+    /// With these noises, by name, under the gate of the team's filter (99.9 %).
+    pub fn new(form: ErrorForm, noises: Noises) -> Self {
+        Self {
+            form,
+            noises,
+            association: Association::Identity,
+            gate: crate::fold::DEFAULT_GATE,
+            // A share of 1e-6 of all sightings of a known landmark lies beyond.
+            apart: [23.9, 27.6, 30.7],
+            margin: 4.0,
+            confirm_sightings: 4,
+            confirm_within_s: 6.0,
+            delayed: DelayedRules::default(),
+        }
+    }
+}
+
+/// A landmark of the map, by the order in which it was first seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct MapId(pub u32);
+
+/// A landmark of the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapEntry {
+    /// Which.
+    pub id: MapId,
+    /// Its block in the state.
+    pub block: Block,
+    /// Its name, where sightings carry one.
+    pub name: Option<LandmarkId>,
+    /// How often it was seen.
+    pub sightings: u32,
+    /// When it was first seen.
+    pub since: Timestamp,
+    /// Whether it has been seen often enough to be believed.
+    pub confirmed: bool,
+}
+
+/// What became of a sighting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outcome {
+    /// It updated the map through this landmark.
+    Used {
+        /// Which.
+        landmark: MapId,
+        /// Normalized innovation squared.
+        nis: f64,
+        /// 1 or 2.
+        dimension: usize,
+    },
+    /// It founded this landmark.
+    Founded {
+        /// Which.
+        landmark: MapId,
+    },
+    /// Its NIS with the landmark of its name was too large.
+    Rejected {
+        /// Which.
+        landmark: MapId,
+        /// Normalized innovation squared.
+        nis: f64,
+        /// 1 or 2.
+        dimension: usize,
+    },
+    /// A bearing that waits for others to cross, or was not kept because it would not.
+    Waiting,
+    /// Several landmarks would explain it, or none well and one badly.
+    Ambiguous,
+    /// It has no linearization, or its kind does not fix a landmark.
+    Unusable,
+}
+
+/// The filter.
+#[derive(Clone, Debug)]
+pub struct Slam {
+    settings: SlamSettings,
+    state: SlamState,
+    map: Vec<MapEntry>,
+    tracks: Vec<BearingTrack>,
+    poses: Vec<Block>,
+    /// The pose kept of the scan that is being taken.
+    here: Option<Block>,
+    next: u32,
+}
+
+/// A sighting of a scan in the making.
+struct Open {
+    index: usize,
+    relative: Relative,
+    noise: Noise,
+}
+
+impl Slam {
+    /// A vehicle at `pose`, known as well as `noise` says in the body frame, and an empty map.
+    pub fn new(settings: SlamSettings, pose: Pose2, noise: Symmetric3) -> Self {
+        let state = SlamState::new(settings.form, pose, noise);
+        Self { settings, state, map: Vec::new(), tracks: Vec::new(), poses: Vec::new(), here: None, next: 0 }
+    }
+
+    /// The state.
+    pub fn state(&self) -> &SlamState {
+        &self.state
+    }
+
+    /// The landmarks in the state, tentative ones included.
+    pub fn map(&self) -> &[MapEntry] {
+        &self.map
+    }
+
+    /// Position of a landmark, m.
+    pub fn position(&self, entry: &MapEntry) -> Vector2 {
+        self.state.place(entry.block).position()
+    }
+
+    /// Past poses in the state at which bearings wait.
+    pub fn waiting_poses(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// A landmark that is known beforehand.
+    pub fn know(&mut self, name: LandmarkId, point: Vector2, since: Timestamp) -> MapId {
+        let block = self.state.insert_known(point);
+        let id = self.enter(block, Some(name), since);
+        if let Some(entry) = self.map.last_mut() {
+            entry.confirmed = true;
+        }
+        id
+    }
+
+    /// The vehicle moves; see [`SlamState::propagate`].
+    pub fn propagate(&mut self, motion: &crate::geometry::Vector3, noise: Symmetric3) {
+        self.state.propagate(motion, noise);
+    }
+
+    /// Takes what was seen at one instant; the outcomes are in the order of the sightings.
+    ///
+    /// # Errors
+    /// [`SampleRefusal::NoNoise`] if a sighting's kind has no noise in the settings; nothing is then changed.
+    pub fn scan(
+        &mut self,
+        time: Timestamp,
+        sightings: &[(LandmarkId, Relative)],
+    ) -> Result<Vec<Outcome>, SampleRefusal> {
+        let mut open = Vec::with_capacity(sightings.len());
+        for (index, (_, relative)) in sightings.iter().enumerate() {
+            open.push(Open { index, relative: *relative, noise: self.settings.noises.of(relative)? });
+        }
+        self.here = None;
+        let mut outcomes = vec![Outcome::Unusable; sightings.len()];
+        match self.settings.association {
+            Association::Identity => {
+                for sighting in &open {
+                    let name = sightings[sighting.index].0;
+                    outcomes[sighting.index] = self.named(time, name, sighting);
+                }
+            }
+            Association::Nearest => self.nearest(time, open, &mut outcomes),
+        }
+        self.forget(time);
+        Ok(outcomes)
+    }
+
+    fn named(&mut self, time: Timestamp, name: LandmarkId, sighting: &Open) -> Outcome {
+        match self.map.iter().position(|entry| entry.name == Some(name)) {
+            Some(known) => self.use_for(known, sighting),
+            None => self.found(time, Some(name), sighting),
+        }
+    }
+
+    fn nearest(&mut self, time: Timestamp, mut open: Vec<Open>, outcomes: &mut [Outcome]) {
+        // Landmarks that were there before this scan; what it founds is not seen twice in it.
+        let mut free: Vec<usize> = (0..self.map.len()).collect();
+        loop {
+            let candidates = self.candidates(&open, &free);
+            let Some(choice) = associate(&candidates, self.settings.margin) else { break };
+            let sighting = open.remove(choice.sighting);
+            let landmark = free.remove(choice.landmark);
+            let outcome = self.use_for(landmark, &sighting);
+            outcomes[sighting.index] = outcome;
+            if let Outcome::Rejected { .. } = outcome {
+                // On the gate but for rounding; the landmark may be gone, and the indices with it.
+                break;
+            }
+        }
+        let known = self.map.len();
+        for sighting in open {
+            outcomes[sighting.index] = if self.apart(&sighting, known) {
+                self.found(time, None, &sighting)
+            } else {
+                Outcome::Ambiguous
+            };
+        }
+    }
+
+    fn candidates(&self, open: &[Open], free: &[usize]) -> Vec<Candidate> {
+        let mut candidates = Vec::new();
+        for (sighting, seen) in open.iter().enumerate() {
+            for (landmark, entry) in free.iter().enumerate() {
+                let block = self.map[*entry].block;
+                let innovation =
+                    self.state.innovation(SlamState::VEHICLE, block, &seen.relative, &seen.noise);
+                if let Ok(innovation) = innovation
+                    && innovation.nis <= self.settings.gate[innovation.dimension - 1]
+                {
+                    let (nis, log_determinant) = (innovation.nis, innovation.log_determinant);
+                    candidates.push(Candidate { sighting, landmark, nis, log_determinant });
+                }
+            }
+        }
+        candidates
+    }
+
+    /// Whether a sighting is of none of the first `known` landmarks.
+    fn apart(&self, seen: &Open, known: usize) -> bool {
+        self.map.iter().take(known).all(|entry| {
+            let innovation =
+                self.state.innovation(SlamState::VEHICLE, entry.block, &seen.relative, &seen.noise);
+            innovation
+                .map_or(true, |innovation| innovation.nis > self.settings.apart[innovation.dimension - 1])
+        })
+    }
+
+    fn use_for(&mut self, known: usize, sighting: &Open) -> Outcome {
+        let MapEntry { id: landmark, block, .. } = self.map[known];
+        let dimension = crate::measurement::dimension(&sighting.relative);
+        let update = self.state.update(
+            SlamState::VEHICLE,
+            block,
+            &sighting.relative,
+            &sighting.noise,
+            &self.settings.gate,
+        );
+        match update {
+            Ok(Update::Used { nis }) => {
+                let entry = &mut self.map[known];
+                entry.sightings += 1;
+                entry.confirmed |= entry.sightings >= self.settings.confirm_sightings;
+                Outcome::Used { landmark, nis, dimension }
+            }
+            Ok(Update::Rejected { nis, .. }) => {
+                // One of the two is wrong; before the landmark is confirmed nobody knows which.
+                if !self.map[known].confirmed {
+                    self.state.remove(block);
+                    self.map.remove(known);
+                }
+                Outcome::Rejected { landmark, nis, dimension }
+            }
+            Ok(Update::Indefinite) | Err(_) => Outcome::Unusable,
+        }
+    }
+
+    /// A landmark that is not in the map.
+    fn found(&mut self, time: Timestamp, name: Option<LandmarkId>, seen: &Open) -> Outcome {
+        if let Relative::Bearing { bearing_rad } = seen.relative {
+            return self.wait(time, name, bearing_rad, &seen.noise);
+        }
+        let sight = Sight { observer: self.state.vehicle(), relative: seen.relative, noise: seen.noise };
+        let Ok(landmark) = from_one(&sight) else { return Outcome::Unusable };
+        let block = self.state.insert(&landmark, [SlamState::VEHICLE; 2]);
+        Outcome::Founded { landmark: self.enter(block, name, time) }
+    }
+
+    fn enter(&mut self, block: Block, name: Option<LandmarkId>, since: Timestamp) -> MapId {
+        let id = MapId(self.next);
+        self.next += 1;
+        let entry = MapEntry { id, block, name, sightings: 1, since, confirmed: false };
+        self.map.push(entry);
+        id
+    }
+
+    /// A bearing of a landmark that is not in the map: crossed with one kept, kept, or let go.
+    fn wait(
+        &mut self,
+        time: Timestamp,
+        name: Option<LandmarkId>,
+        bearing_rad: f64,
+        noise: &Noise,
+    ) -> Outcome {
+        let rules = self.settings.delayed;
+        let vehicle = self.state.vehicle();
+        let slack_rad = 3.0 * libm::sqrt(noise.lower[0]);
+        let fits = |track: &&BearingTrack| match name {
+            Some(_) => track.name == name,
+            None => track.last_seen < time && track.misfit_rad(&vehicle, bearing_rad, &rules) <= slack_rad,
+        };
+        let mut fitting = self.tracks.iter().enumerate().filter(|(_, track)| fits(track));
+        let (found, other) = (fitting.next().map(|(index, _)| index), fitting.next());
+        if other.is_some() {
+            return Outcome::Ambiguous;
+        }
+        if let Some(index) = found {
+            self.tracks[index].last = (vehicle, bearing_rad);
+            self.tracks[index].last_seen = time;
+            if let Some((best, landmark)) = self.tracks[index].cross(&self.state, bearing_rad, noise, &rules)
+            {
+                return self.crossed(time, index, best, &landmark, noise);
+            }
+        }
+        if let Some(pose) = self.pose_here() {
+            let kept = KeptBearing { pose, bearing_rad };
+            match found {
+                Some(index) if self.tracks[index].kept.iter().any(|kept| kept.pose == pose) => {}
+                Some(index) => self.tracks[index].kept.push(kept),
+                None => self.tracks.push(BearingTrack {
+                    name,
+                    kept: vec![kept],
+                    last_seen: time,
+                    last: (vehicle, bearing_rad),
+                }),
+            }
+        }
+        Outcome::Waiting
+    }
+
+    /// The pose kept of this scan; a new one if the vehicle has come far enough since the last.
+    fn pose_here(&mut self) -> Option<Block> {
+        if self.here.is_some() {
+            return self.here;
+        }
+        if let Some(last) = self.poses.last() {
+            let gone = self.state.vehicle().position() - self.state.place(*last).position();
+            if gone.norm() < self.settings.delayed.baseline_m {
+                return None;
+            }
+        }
+        if self.poses.len() >= self.settings.delayed.most_poses {
+            let oldest = self.poses.remove(0);
+            self.state.remove(oldest);
+            for track in &mut self.tracks {
+                track.kept.retain(|kept| kept.pose != oldest);
+            }
+        }
+        let pose = self.state.keep_pose();
+        self.poses.push(pose);
+        self.here = Some(pose);
+        self.here
+    }
+
+    /// A landmark enters the state; its other kept bearings update it.
+    fn crossed(
+        &mut self,
+        time: Timestamp,
+        track: usize,
+        best: usize,
+        landmark: &super::Initialized,
+        noise: &Noise,
+    ) -> Outcome {
+        let track = self.tracks.remove(track);
+        let block = self.state.insert(landmark, [track.kept[best].pose, SlamState::VEHICLE]);
+        let id = self.enter(block, track.name, time);
+        let mut used = 2;
+        for (index, kept) in track.kept.iter().enumerate() {
+            let relative = Relative::Bearing { bearing_rad: kept.bearing_rad };
+            if index != best {
+                // One that does not fit is left out, as a later one would be.
+                let update = self.state.update(kept.pose, block, &relative, noise, &self.settings.gate);
+                used += u32::from(matches!(update, Ok(Update::Used { .. })));
+            }
+        }
+        if let Some(entry) = self.map.last_mut() {
+            entry.sightings = used;
+            entry.confirmed = used >= self.settings.confirm_sightings;
+        }
+        Outcome::Founded { landmark: id }
+    }
+
+    /// Leaves out tentative landmarks that were not seen again, nameless bearings that ended, and poses at which
+    /// nothing waits.
+    fn forget(&mut self, time: Timestamp) {
+        let within_s = self.settings.confirm_within_s;
+        let state = &mut self.state;
+        self.map.retain(|entry| {
+            let keep = entry.confirmed || entry.name.is_some() || time.seconds_since(entry.since) <= within_s;
+            if !keep {
+                state.remove(entry.block);
+            }
+            keep
+        });
+        self.tracks.retain(|track| {
+            let recent = track.name.is_some() || time.seconds_since(track.last_seen) <= within_s;
+            recent && !track.kept.is_empty()
+        });
+        let tracks = &self.tracks;
+        self.poses.retain(|pose| {
+            let waits = tracks.iter().any(|track| track.kept.iter().any(|kept| kept.pose == *pose));
+            if !waits {
+                state.remove(*pose);
+            }
+            waits
+        });
+    }
+}
