@@ -1,0 +1,4 @@
+//! Methods that calibrate odometry, as they were published. Each is a function of recordings: nothing is simulated
+//! and nothing is read or written here.
+
+pub mod umbmark;
