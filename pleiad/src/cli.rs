@@ -1,5 +1,6 @@
 //! The command line, as clap sees it.
 
+mod calibrate;
 mod survey;
 mod values;
 
@@ -10,6 +11,7 @@ use pleiad_benchmark::Asked;
 use pleiad_estimation::strategy::StrategyKind;
 use pleiad_sim_peers::scenario::ManoeuvreKind;
 
+pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
 pub use survey::SurveyArgs;
 pub use values::{AbsoluteArg, LandmarksArg};
 
@@ -42,6 +44,9 @@ pub enum Command {
     Faults(FaultsArgs),
     /// The systems that the joint filter grew from, each as a study with its claims: Kalman filter, gyro, rover and others.
     Survey(SurveyArgs),
+    /// Odometry calibrated by published procedures: squares in both directions, scans against a map.
+    #[command(subcommand)]
+    Calibrate(Calibrate),
     /// The physics a simulation can leave out: names, parameters, equations.
     Effects(EffectsArgs),
     /// One robot's agent.

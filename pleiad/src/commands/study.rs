@@ -15,13 +15,18 @@ use crate::output;
 pub fn finish(study: &Study, out: &Path, as_json: bool, command: &str) -> anyhow::Result<()> {
     let summary = summary(study);
     write_summary(&out.join("summary.json"), &summary)?;
-    page(study, command).write(&out.join("report.html"))?;
+    write_page(study, out, command)?;
     output::print(as_json, &summary, &text(study, out))?;
     let failed = study.claims.iter().filter(|claim| !claim.holds).count();
     if failed > 0 {
         bail!("{}: {failed} of {} claims do not hold", study.name, study.claims.len());
     }
     Ok(())
+}
+
+/// The page alone, `report.html`.
+pub fn write_page(study: &Study, out: &Path, command: &str) -> anyhow::Result<()> {
+    Ok(page(study, command).write(&out.join("report.html"))?)
 }
 
 fn summary(study: &Study) -> Value {

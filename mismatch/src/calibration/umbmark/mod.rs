@@ -11,7 +11,6 @@ mod corrected;
 mod error;
 mod factors;
 mod plan;
-mod reckoned;
 mod run;
 mod square;
 

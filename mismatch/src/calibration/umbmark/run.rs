@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::corrected::with_factors;
 use super::error::UmbmarkError;
 use super::factors::WheelFactors;
-use super::reckoned::{Reckoned, reckon};
+use crate::calibration::reckoned::{Reckoned, reckon};
 
 /// Shorter than this a square is too small against the errors of a measured pose, metres around.
 const LEAST_AROUND_M: f64 = 2.0;
