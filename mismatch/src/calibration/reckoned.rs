@@ -13,8 +13,6 @@ pub(super) struct Reckoned {
     pub(super) pose: Pose<f64>,
     /// Distance driven, forwards and backwards, metres.
     pub(super) path_m: f64,
-    /// Angle turned, left and right, radians.
-    pub(super) turned_rad: f64,
 }
 
 /// Integrates odometry under a model of the robot. Velocities and increments were made of wheel angles by the
@@ -29,10 +27,10 @@ pub(super) fn reckon(odometry: &[Sample], model: &RobotModel<f64>) -> Vec<Reckon
     for sample in odometry {
         let Some(reading) = reading(&sample.reading) else { continue };
         let time_s = sample.time.seconds();
-        let Some(&Reckoned { time: _, pose, path_m, turned_rad }) = path.last() else {
+        let Some(&Reckoned { time: _, pose, path_m }) = path.last() else {
             state.restart(&correction, time_s, reading);
             let here = Pose::identity();
-            path.push(Reckoned { time: sample.time, pose: here, path_m: 0.0, turned_rad: 0.0 });
+            path.push(Reckoned { time: sample.time, pose: here, path_m: 0.0 });
             continue;
         };
         let moved = state.step(&correction, pose, time_s, reading);
@@ -40,7 +38,6 @@ pub(super) fn reckon(odometry: &[Sample], model: &RobotModel<f64>) -> Vec<Reckon
             time: sample.time,
             pose: pose.compose(&moved),
             path_m: path_m + moved.x_m.hypot(moved.y_m),
-            turned_rad: turned_rad + moved.yaw_rad.abs(),
         });
     }
     path

@@ -13,15 +13,20 @@ use crate::output;
 /// Writes `report.html` and `summary.json` into the folder and prints the study. An error if a claim does not hold:
 /// a script should notice.
 pub fn finish(study: &Study, out: &Path, as_json: bool, command: &str) -> anyhow::Result<()> {
-    let summary = summary(study);
-    write_summary(&out.join("summary.json"), &summary)?;
-    write_page(study, out, command)?;
-    output::print(as_json, &summary, &text(study, out))?;
+    show(study, out, as_json, command)?;
     let failed = study.claims.iter().filter(|claim| !claim.holds).count();
     if failed > 0 {
         bail!("{}: {failed} of {} claims do not hold", study.name, study.claims.len());
     }
     Ok(())
+}
+
+/// The same for a command whose product is something else than its claims: they are shown, whatever they say.
+pub fn show(study: &Study, out: &Path, as_json: bool, command: &str) -> anyhow::Result<()> {
+    let summary = summary(study);
+    write_summary(&out.join("summary.json"), &summary)?;
+    write_page(study, out, command)?;
+    output::print(as_json, &summary, &text(study, out))
 }
 
 /// The page alone, `report.html`.

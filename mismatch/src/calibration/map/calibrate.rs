@@ -231,7 +231,6 @@ impl Driven<'_> {
             time,
             pose: before.pose.compose(&Pose::new(twist[0], twist[1], twist[2])),
             path_m: before.path_m + share * (next.path_m - before.path_m),
-            turned_rad: before.turned_rad + share * (next.turned_rad - before.turned_rad),
         })
     }
 

@@ -20,7 +20,7 @@ const LEAST_AROUND_M: f64 = 2.0;
 /// A straight run is at least so long, metres, and turned by no more than this, radians.
 const LEAST_STRAIGHT_M: f64 = 1.0;
 const STRAIGHT_RAD: f64 = 0.35;
-/// A turn on the spot is at least so wide, radians, and drives no more than this, metres.
+/// A turn on the spot is at least so wide, radians, and comes no farther from its start than this, metres.
 const LEAST_TURN_RAD: f64 = FRAC_PI_2;
 const ON_THE_SPOT_M: f64 = 0.1;
 /// A square turns by four corners, or by three if the run ends at the last side: between these, radians.
@@ -178,7 +178,6 @@ impl Run {
             time: pleiad_estimation::Timestamp(0),
             pose: Pose::identity(),
             path_m: 0.0,
-            turned_rad: 0.0,
         })
     }
 
@@ -197,10 +196,11 @@ impl Run {
 /// What was driven; or what was found, and what was expected.
 fn kind(path: &[Reckoned], last: &Reckoned) -> Result<Kind, (String, &'static str)> {
     let turned_rad = last.pose.yaw_rad;
-    if last.path_m < ON_THE_SPOT_M && turned_rad.abs() >= LEAST_TURN_RAD {
+    let greatest = |of: fn(&Reckoned) -> f64| path.iter().map(of).fold(0.0, f64::max);
+    if greatest(|at| at.pose.x_m.hypot(at.pose.y_m)) < ON_THE_SPOT_M && turned_rad.abs() >= LEAST_TURN_RAD {
         return Ok(Kind::Turn);
     }
-    if last.turned_rad < STRAIGHT_RAD && last.path_m >= LEAST_STRAIGHT_M {
+    if greatest(|at| at.pose.yaw_rad.abs()) < STRAIGHT_RAD && last.path_m >= LEAST_STRAIGHT_M {
         return Ok(Kind::Straight);
     }
     if last.path_m < LEAST_AROUND_M {

@@ -18,7 +18,7 @@ pub fn run(args: &MapArgs) -> anyhow::Result<()> {
         let spinner = output::spinner("driving and matching");
         let outcome = map::run(&StudyOptions { seeds: args.seeds, first_seed: args.first_seed })?;
         spinner.finish_and_clear();
-        return study::finish(&outcome, &out, args.json, &command_line());
+        return study::show(&outcome, &out, args.json, &command_line());
     };
     let options = ReadOptions { skip_bad_rows: args.skip_bad_rows };
     let (recording, _) = pleiad_recording::open(&setup::recording_folder(path), &options)?;
@@ -43,7 +43,7 @@ pub fn run(args: &MapArgs) -> anyhow::Result<()> {
     *own = corrected(own, errors.factors().upon(believed(&own.effects)), [None; 3]);
     let comment = format!("The nominal model of robot {robot} with what `pleiad calibrate map` found. SI units, radians.");
     write_model(&out.join("corrected.toml"), &model, &comment)?;
-    study::finish(&page(&recording.name, &calibration, &options), &out, args.json, &command_line())
+    study::show(&page(&recording.name, &calibration, &options), &out, args.json, &command_line())
 }
 
 fn page(name: &str, calibration: &MapCalibration, options: &MapOptions) -> Study {

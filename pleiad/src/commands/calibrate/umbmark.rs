@@ -44,7 +44,7 @@ fn simulated(args: &UmbmarkArgs) -> anyhow::Result<()> {
         let robot = *recording.robots.keys().next().context("no robot was driven")?;
         write_corrected(&out, recording, robot, &first.calibration, "simulated squares")?;
     }
-    study::finish(&outcome, &out, args.json, &command_line())
+    study::show(&outcome, &out, args.json, &command_line())
 }
 
 /// Calibrates on recordings.
@@ -71,7 +71,7 @@ fn recorded(args: &UmbmarkArgs) -> anyhow::Result<()> {
     };
     let (after, held_out) = left_out(&runs, known)?;
     write_corrected(&out, first, robot, &calibration, "recorded squares")?;
-    study::finish(&of_recordings(&calibration, &after, held_out), &out, args.json, &command_line())
+    study::show(&of_recordings(&calibration, &after, held_out), &out, args.json, &command_line())
 }
 
 /// What the recordings' models say of the wheels already: the same in all, or there is no one robot to correct.
