@@ -16,6 +16,10 @@ pub use study::{Claim, Known, Shown, Study, StudyOptions};
 
 /// The studies of `pleiad survey`, in the order of the survey's sections.
 pub const STUDIES: &[Known] = &[
-    Known { name: "umbmark", about: "systematic odometry errors from squares in both directions", run: umbmark::run },
+    Known {
+        name: "umbmark",
+        about: "systematic odometry errors from squares in both directions",
+        run: umbmark::run,
+    },
     Known { name: "map", about: "odometry errors per metre from range scans against a map", run: map::run },
 ];

@@ -15,7 +15,8 @@ fn errors_per_metre_are_recovered_from_wrong_parameters_and_a_change_is_followed
     let with = |gamma: f64| {
         let start = Drift { trans: -0.05, rot_rad_m: 0.05 };
         let reach = Drift { trans: 0.12, rot_rad_m: 0.12 };
-        calibrate(&run.recording, ROBOT, &MapOptions { gamma, start, reach, ..MapOptions::default() }).unwrap()
+        calibrate(&run.recording, ROBOT, &MapOptions { gamma, start, reach, ..MapOptions::default() })
+            .unwrap()
     };
     let adapting = with(0.9);
     let mean = |from_s: f64, until_s: f64| {
@@ -34,10 +35,20 @@ fn errors_per_metre_are_recovered_from_wrong_parameters_and_a_change_is_followed
     assert!((second.trans + 0.02).abs() < 0.01 && (second.rot_rad_m - 0.015).abs() < 0.01, "{second:?}");
     // The planted fault: a belief that never adapts stays wrong.
     let still = with(1.0);
-    assert!(still.stretches.iter().all(|stretch| stretch.estimate == Drift { trans: -0.05, rot_rad_m: 0.05 }));
+    assert!(
+        still.stretches.iter().all(|stretch| stretch.estimate == Drift { trans: -0.05, rot_rad_m: 0.05 })
+    );
     let following = with(0.0);
-    assert!(following.stretches.iter().all(|stretch| stretch.best.is_none_or(|best| best == stretch.estimate)));
-    assert!(following.stretches.iter().filter_map(|stretch| stretch.score).all(|score| (0.0..=1.0).contains(&score)));
+    assert!(
+        following.stretches.iter().all(|stretch| stretch.best.is_none_or(|best| best == stretch.estimate))
+    );
+    assert!(
+        following
+            .stretches
+            .iter()
+            .filter_map(|stretch| stretch.score)
+            .all(|score| (0.0..=1.0).contains(&score))
+    );
 }
 
 #[test]

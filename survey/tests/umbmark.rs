@@ -24,7 +24,7 @@ fn squares_in_both_directions_recover_the_wheels_and_the_correction_brings_the_r
         assert!((found.e_s - injected.e_s).abs() < 3e-3, "{found:?}");
         assert!(trial.improvement() > 3.0, "{}", trial.improvement());
         // The planted fault: the correction on the wrong wheels.
-        assert!(trial.swapped.e_max_syst_m > trial.calibration.before.e_max_syst_m);
+        assert!(trial.swapped.e_max_syst_m > trial.track_alone.e_max_syst_m);
     }
     let outcome = umbmark::study(&trials);
     for key in ["before", "after", "e_d", "e_b", "e_s", "alpha_rad", "beta_rad"] {
@@ -35,7 +35,8 @@ fn squares_in_both_directions_recover_the_wheels_and_the_correction_brings_the_r
 
 #[test]
 fn a_track_tuned_on_one_direction_comes_home_there_and_misses_the_other() {
-    let trials = umbmark::trials(&umbmark::scenario().unwrap(), &StudyOptions { seeds: Some(2), ..few() }).unwrap();
+    let trials =
+        umbmark::trials(&umbmark::scenario().unwrap(), &StudyOptions { seeds: Some(2), ..few() }).unwrap();
     let first = &trials.own[0];
     let one_way: Vec<Run> = first
         .first
@@ -70,7 +71,9 @@ fn odometry_with_the_corrected_model_follows_the_truth_better() {
         let run = Run::of(recording, robot).unwrap();
         pleiad_mismatch::calibration::umbmark::return_error(
             &run,
-            pleiad_mismatch::calibration::umbmark::believed(&recording.nominal.as_ref().unwrap().robots[&robot].effects),
+            pleiad_mismatch::calibration::umbmark::believed(
+                &recording.nominal.as_ref().unwrap().robots[&robot].effects,
+            ),
         )
     };
     let [x, y] = off(&recording);

@@ -122,7 +122,9 @@ fn render(recording: &Recording) -> Result<Vec<(String, String)>, String> {
         let mut walls = WALL_COLUMNS.join(",") + "\n";
         for wall in &recording.walls {
             let mut row = String::new();
-            wall.iter().try_for_each(|&value| push_cell(&mut row, value)).map_err(|what| format!("walls: {what}"))?;
+            wall.iter()
+                .try_for_each(|&value| push_cell(&mut row, value))
+                .map_err(|what| format!("walls: {what}"))?;
             walls.push_str(row.trim_start_matches(','));
             walls.push('\n');
         }

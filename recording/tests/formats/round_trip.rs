@@ -7,8 +7,8 @@ use crate::common::{Folder, read_with};
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
 use pleiad_estimation::{LandmarkId, Pose2, RobotId, Timestamp};
 use pleiad_recording::{
-    BeamSample, Command, Nominal, NominalRobot, Overwrite, ReadOptions, Recording, RobotRecording, SteerSample,
-    TruthSample, open, write_folder,
+    BeamSample, Command, Nominal, NominalRobot, Overwrite, ReadOptions, Recording, RobotRecording,
+    SteerSample, TruthSample, open, write_folder,
 };
 use proptest::collection::{btree_map, btree_set};
 use proptest::prelude::*;

@@ -126,7 +126,8 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<SimulatedRun, Error> {
 
 /// Brings every channel into the order of its stamps, which a clock that is set back loses.
 fn sort(recorded: &mut RobotRecording) {
-    let RobotRecording { commands, odometry, gyro, gps, heading, sightings, steer, scans, truth: _ } = recorded;
+    let RobotRecording { commands, odometry, gyro, gps, heading, sightings, steer, scans, truth: _ } =
+        recorded;
     commands.sort_by_key(|command| command.time);
     steer.sort_by_key(|steer| steer.time);
     scans.sort_by_key(|beam| beam.time);

@@ -25,7 +25,11 @@ pub(super) fn scans(channels: &Channels<'_>, walls: &[[f64; 4]]) -> Vec<BeamSamp
             let from = [pose.x_m(), pose.y_m()];
             let Some(range_m) = distance(from, pose.yaw_rad() + bearing_rad, walls) else { continue };
             if range_m <= scan.max_range_m && range_m + noise_m > NEAREST_M {
-                beams.push(BeamSample { time: channels.stamp(time), bearing_rad, range_m: range_m + noise_m });
+                beams.push(BeamSample {
+                    time: channels.stamp(time),
+                    bearing_rad,
+                    range_m: range_m + noise_m,
+                });
             }
         }
     }

@@ -36,7 +36,11 @@ pub(super) fn study(trials: &[Trial]) -> Study {
         numbers.insert("a_rot_rad_m".into(), json!(last.rot_rad_m));
         numbers.insert(
             "injected".into(),
-            first.windows.iter().map(|window| json!({"time_s": window.time_s, "drift": window.injected})).collect(),
+            first
+                .windows
+                .iter()
+                .map(|window| json!({"time_s": window.time_s, "drift": window.injected}))
+                .collect(),
         );
     }
     shown.push(Shown::Table(by_gamma(trials)));
@@ -147,18 +151,25 @@ fn thin(trials: &[Trial], numbers: &mut Map<String, Value>) -> Option<Claim> {
                 let half = usize::from(stretch.time_s >= trial.windows[1].time_s[0]);
                 let injected = trial.windows[half].injected;
                 let best = stretch.best?;
-                Some((stretch.seen, (best.trans - injected.trans).powi(2) + (best.rot_rad_m - injected.rot_rad_m).powi(2)))
+                Some((
+                    stretch.seen,
+                    (best.trans - injected.trans).powi(2) + (best.rot_rad_m - injected.rot_rad_m).powi(2),
+                ))
             })
             .collect();
         all.sort_by(|one, other| one.0.total_cmp(&other.0));
         let quarter = all.len() / 4;
-        let mean = |part: &[(f64, f64)]| part.iter().map(|(_, square)| square).sum::<f64>() / part.len() as f64;
+        let mean =
+            |part: &[(f64, f64)]| part.iter().map(|(_, square)| square).sum::<f64>() / part.len() as f64;
         (quarter > 0).then(|| (mean(&all[..quarter]) / mean(&all[all.len() - quarter..])).ln())
     };
     let logs: Option<Vec<f64>> = trials.iter().map(ratio).collect();
     let ratio = Estimate::of(&logs?)?;
     let [low, high] = ratio.interval.map(|end| (0.5 * end).exp());
-    numbers.insert("thin_over_rich_rms".into(), json!({"ratio": (0.5 * ratio.mean).exp(), "interval": [low, high]}));
+    numbers.insert(
+        "thin_over_rich_rms".into(),
+        json!({"ratio": (0.5 * ratio.mean).exp(), "interval": [low, high]}),
+    );
     Some(Claim {
         statement: "mu_min keeps out bad witnesses: the quarter of the stretches that see least err more than the quarter that \
                     sees most"
@@ -223,8 +234,9 @@ fn by_mu(trials: &[Trial]) -> Table {
                 squares[1] += (best.rot_rad_m - injected.rot_rad_m).powi(2);
             }
         }
-        let [trans, rot] =
-            squares.map(|sum: f64| if count > 0 { format!("{:.5}", (sum / f64::from(count)).sqrt()) } else { "-".into() });
+        let [trans, rot] = squares.map(|sum: f64| {
+            if count > 0 { format!("{:.5}", (sum / f64::from(count)).sqrt()) } else { "-".into() }
+        });
         let matched = 100.0 * f64::from(count) / of.max(1) as f64;
         table = table.row([mu_min.to_string(), format!("{matched:.1}"), trans, rot]);
     }
@@ -239,7 +251,8 @@ pub fn followed(windows: &[Window], calibrations: &[MapCalibration], gammas: &[f
     for (row, (_, _, pick)) in ERRORS.into_iter().enumerate() {
         for (series, (calibration, gamma)) in calibrations.iter().zip(gammas).enumerate() {
             let time: Vec<f64> = calibration.stretches.iter().map(|stretch| stretch.time_s).collect();
-            let value: Vec<f64> = calibration.stretches.iter().map(|stretch| pick(&stretch.estimate)).collect();
+            let value: Vec<f64> =
+                calibration.stretches.iter().map(|stretch| pick(&stretch.estimate)).collect();
             let name = format!("gamma {gamma}");
             let trace = Trace::step(&name, &time, &value, Colour::Series(series)).in_row(row).group(&name);
             figure = figure.trace(if row == 0 { trace } else { trace.unlisted() });

@@ -15,7 +15,7 @@ pub(super) const GAMMAS: [f64; 4] = [0.0, 0.5, 0.9, 1.0];
 /// The one that is judged: the default.
 pub(super) const JUDGED: usize = 2;
 /// Bounds on what has to be seen that are shown.
-pub(super) const MU_MINS: [f64; 4] = [0.0, 40.0, 80.0, 120.0];
+pub(super) const MU_MINS: [f64; 4] = [0.0, 1100.0, 1200.0, 1300.0];
 const ROBOT: RobotId = RobotId(1);
 /// The estimate of a half is its mean over the last part of it, so long as a share of the half.
 const LAST: f64 = 0.4;
@@ -83,7 +83,12 @@ impl Trial {
         let [from, until] = self.windows[half].time_s;
         let from = until - LAST * (until - from);
         let within = |time_s: f64| (from..until).contains(&time_s);
-        self.by_gamma[gamma].stretches.iter().filter(|stretch| within(stretch.time_s)).filter_map(of).collect()
+        self.by_gamma[gamma]
+            .stretches
+            .iter()
+            .filter(|stretch| within(stretch.time_s))
+            .filter_map(of)
+            .collect()
     }
 }
 

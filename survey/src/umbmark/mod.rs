@@ -82,8 +82,11 @@ fn drawn(scenario: &Scenario, seed: u64) -> Result<Scenario, SurveyError> {
     random.set_stream(1996);
     let [unequal, track, radius] = SPREAD.map(|most| random.random_range(-most..most));
     let mut scenario = scenario.clone();
-    let effects =
-        [(Effect::UnequalWheelRadii, unequal), (Effect::TrackWidthError, track), (Effect::WheelRadiusError, radius)];
+    let effects = [
+        (Effect::UnequalWheelRadii, unequal),
+        (Effect::TrackWidthError, track),
+        (Effect::WheelRadiusError, radius),
+    ];
     for settings in scenario.robots.values_mut() {
         settings.effects.retain(|active| effects.iter().all(|(effect, _)| *effect != active.effect()));
         for (effect, value) in effects {

@@ -15,7 +15,8 @@ const DIRECTIONS: [Turning; 2] = [Turning::CounterClockwise, Turning::Clockwise]
 
 /// Where runs of both directions ended, stage by stage: the figure that UMBmark is known for.
 pub fn returns(stages: &[(&str, &Stage)]) -> Shown {
-    let mut figure = Figure::new(Axis::new("x error", "m"), Axis::new("y error", "m")).equal_aspect().height(460);
+    let mut figure =
+        Figure::new(Axis::new("x error", "m"), Axis::new("y error", "m")).equal_aspect().height(460);
     for (series, (name, stage)) in stages.iter().enumerate() {
         let colour = Colour::Series(series);
         let directions = [
@@ -110,15 +111,20 @@ pub(super) fn recovered(drawn: &[(WheelErrors, WheelErrors)]) -> Shown {
         let found: Vec<f64> = drawn.iter().map(|(_, found)| 1e3 * (pick(*found) - 1.0)).collect();
         [injected, found]
     };
-    let mut figure = Figure::new(Axis::new("injected, less 1", "1e-3"), Axis::new("recovered, less 1", "1e-3"));
-    figure = figure.trace(Trace::line("equal", &[-30.0, 30.0], &[-30.0, 30.0], Colour::Muted).dash(Dash::Dot));
+    let mut figure =
+        Figure::new(Axis::new("injected, less 1", "1e-3"), Axis::new("recovered, less 1", "1e-3"));
+    figure =
+        figure.trace(Trace::line("equal", &[-30.0, 30.0], &[-30.0, 30.0], Colour::Muted).dash(Dash::Dot));
     let ratios: [(&str, fn(WheelErrors) -> f64); 3] =
         [("E_d", |errors| errors.e_d), ("E_b", |errors| errors.e_b), ("E_s", |errors| errors.e_s)];
     for (series, (name, pick)) in ratios.into_iter().enumerate() {
         let [injected, found] = of(pick);
         figure = figure.trace(Trace::markers(name, &injected, &found, Colour::Series(series), "circle", 6.0));
     }
-    Shown::Figure(figure, "Robots drawn at random, one procedure each: recovered against injected.".to_owned())
+    Shown::Figure(
+        figure,
+        "Robots drawn at random, one procedure each: recovered against injected.".to_owned(),
+    )
 }
 
 fn columns(points: &[[f64; 2]]) -> [Vec<f64>; 2] {

@@ -1,8 +1,6 @@
 //! One procedure: measure, correct, and measure again on fresh runs.
 
-use pleiad_mismatch::calibration::umbmark::{
-    Stage, Umbmark, WheelErrors, WheelFactors, calibrate, stage,
-};
+use pleiad_mismatch::calibration::umbmark::{Stage, Umbmark, WheelErrors, WheelFactors, calibrate, stage};
 use pleiad_physics::Effect;
 use pleiad_sim_peers::Scenario;
 
@@ -19,6 +17,8 @@ pub struct Trial {
     pub calibration: Umbmark,
     /// The second runs, with corrected odometry.
     pub after: Stage,
+    /// The first runs with the track and the scale alone corrected.
+    pub track_alone: Stage,
     /// The first runs with `c_L` and `c_R` on the wrong wheels.
     pub swapped: Stage,
     /// What was injected.
@@ -32,9 +32,11 @@ impl Trial {
         let first = drive(scenario, WheelFactors::NONE, seed, 0)?;
         let calibration = calibrate(&first.runs, WheelFactors::NONE).map_err(study_error)?;
         let swapped = stage(&first.runs, calibration.factors.swapped()).map_err(study_error)?;
+        let mean = WheelErrors { e_d: 1.0, ..calibration.factors.errors() }.factors();
+        let track_alone = stage(&first.runs, mean).map_err(study_error)?;
         let second = drive(scenario, calibration.factors, seed, 1)?;
         let after = stage(&second.runs, calibration.factors).map_err(study_error)?;
-        Ok(Self { first, second, calibration, after, swapped, injected })
+        Ok(Self { first, second, calibration, after, track_alone, swapped, injected })
     }
 
     /// By how much `E_max,syst` falls.

@@ -44,5 +44,8 @@ fn squares_that_were_driven_are_calibrated_on_and_the_model_makes_a_replay_bette
     let stderr = run(within, arguments(&clockwise, "one")).failure();
     assert!(stderr.contains("clockwise") && stderr.contains("Drive as many squares"), "{stderr}");
     let report = std::fs::read_to_string(within.join("one/report.html")).unwrap();
-    assert!(report.contains("1.0339") && report.contains("masked square"), "the report shows the masked square");
+    assert!(
+        report.contains("1.0339") && report.contains("masked square"),
+        "the report shows the masked square"
+    );
 }

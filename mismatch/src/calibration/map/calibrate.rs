@@ -105,10 +105,8 @@ pub fn calibrate(
         missing,
         remedy,
     };
-    let own = recording
-        .robots
-        .get(&robot)
-        .ok_or_else(|| missing("channel of it", "name a robot that recorded"))?;
+    let own =
+        recording.robots.get(&robot).ok_or_else(|| missing("channel of it", "name a robot that recorded"))?;
     let model = recording
         .nominal
         .as_ref()
@@ -129,10 +127,9 @@ pub fn calibrate(
     if path.len() < 2 {
         return Err(missing("odometry", "record wheel_odometry.csv, velocity.csv or increment.csv"));
     }
-    let start = own
-        .truth
-        .first()
-        .ok_or_else(|| missing("true pose at the start", "write one row into truth.csv: where the robot was put"))?;
+    let start = own.truth.first().ok_or_else(|| {
+        missing("true pose at the start", "write one row into truth.csv: where the robot was put")
+    })?;
     let start = Pose::new(start.pose.x_m(), start.pose.y_m(), start.pose.yaw_rad());
     let scans: Vec<&[BeamSample]> = own.scans.chunk_by(|one, other| one.time == other.time).collect();
     let run = Driven { path: &path, scans: &scans, map: &map, options };
@@ -294,7 +291,8 @@ fn pairs<'a>(
 /// the middle. `None` where there is no score.
 fn search(middle: Drift, reach: Drift, score: impl Fn(Drift) -> Option<f64>) -> Option<(Drift, f64)> {
     let mut best = (middle, score(middle)?);
-    let mut step = Drift { trans: reach.trans / f64::from(STEPS), rot_rad_m: reach.rot_rad_m / f64::from(STEPS) };
+    let mut step =
+        Drift { trans: reach.trans / f64::from(STEPS), rot_rad_m: reach.rot_rad_m / f64::from(STEPS) };
     for round in 0..ROUNDS {
         let centre = best.0;
         let steps = if round == 0 { STEPS } else { 2 };

@@ -42,7 +42,9 @@ pub enum MapError {
         length_m: f64,
     },
     /// A map too large for a grid.
-    #[error("walls.csv spans {width_m:.0} m by {height_m:.0} m: with cells of {cell_m} m that is too large a grid; raise the cell")]
+    #[error(
+        "walls.csv spans {width_m:.0} m by {height_m:.0} m: with cells of {cell_m} m that is too large a grid; raise the cell"
+    )]
     TooLarge {
         /// Along x, metres.
         width_m: f64,

@@ -34,7 +34,8 @@ impl Grid {
             [origin_m[0] + (column as f64 + 0.5) * cell_m, origin_m[1] + (row as f64 + 0.5) * cell_m]
         };
         let occupied = |index: usize| {
-            let nearest_m = walls.iter().map(|wall| distance_m(centre(index), wall)).fold(f64::INFINITY, f64::min);
+            let nearest_m =
+                walls.iter().map(|wall| distance_m(centre(index), wall)).fold(f64::INFINITY, f64::min);
             FREE + (OCCUPIED - FREE) * (1.0 - nearest_m / cell_m).max(0.0)
         };
         Some(Self { origin_m, cell_m, columns, rows, cells: (0..columns * rows).map(occupied).collect() })
@@ -49,7 +50,8 @@ impl Grid {
         // A cast of what is far outside saturates and stays outside.
         #[allow(clippy::cast_possible_truncation)]
         let (left, below) = (left as i64, below as i64);
-        let value = |column: i64, row: i64| self.index([column, row]).map_or(UNKNOWN, |index| self.cells[index]);
+        let value =
+            |column: i64, row: i64| self.index([column, row]).map_or(UNKNOWN, |index| self.cells[index]);
         let lower = (1.0 - share_x) * value(left, below) + share_x * value(left + 1, below);
         let upper = (1.0 - share_x) * value(left, below + 1) + share_x * value(left + 1, below + 1);
         (1.0 - share_y) * lower + share_y * upper

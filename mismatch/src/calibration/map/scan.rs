@@ -26,10 +26,7 @@ pub fn local_grid(scans: &[(Pose<f64>, &[BeamSample])], cell_m: f64) -> Vec<Loca
         let mut said: BTreeMap<[i64; 2], bool> = BTreeMap::new();
         for beam in *beams {
             let direction = pose.yaw_rad + beam.bearing_rad;
-            let to = [
-                pose.x_m + beam.range_m * direction.cos(),
-                pose.y_m + beam.range_m * direction.sin(),
-            ];
+            let to = [pose.x_m + beam.range_m * direction.cos(), pose.y_m + beam.range_m * direction.sin()];
             let cells = cells_on([pose.x_m, pose.y_m], to, [0.0, 0.0], cell_m);
             for (number, (cell, _)) in cells.iter().enumerate() {
                 let met = number + 1 == cells.len();

@@ -101,9 +101,8 @@ pub fn return_error(run: &Run, factors: WheelFactors) -> [f64; 2] {
 /// [`UmbmarkError::NoSquare`], [`UmbmarkError::OneDirection`].
 pub fn stage(runs: &[Run], factors: WheelFactors) -> Result<Stage, UmbmarkError> {
     let of = |wanted: Turning| {
-        let squares = runs.iter().filter(
-            |run| matches!(run.kind, Kind::Square { turning, .. } if turning == wanted),
-        );
+        let squares =
+            runs.iter().filter(|run| matches!(run.kind, Kind::Square { turning, .. } if turning == wanted));
         Centre::of(squares.map(|run| return_error(run, factors)).collect())
     };
     match (of(Turning::Clockwise), of(Turning::CounterClockwise)) {
@@ -179,7 +178,10 @@ pub fn calibrate(runs: &[Run], known: WheelFactors) -> Result<Umbmark, UmbmarkEr
         side_m,
         nominal_track_m,
         radius_m: 0.5 * side_m * scale / (0.5 * angles.beta_rad).sin(),
-        e_d: Interval { value: whole.e_d, ci95: half.map(|half| around(|errors| errors.e_d, half, [0.0, 1.0])) },
+        e_d: Interval {
+            value: whole.e_d,
+            ci95: half.map(|half| around(|errors| errors.e_d, half, [0.0, 1.0])),
+        },
         e_b: Interval { value: whole.e_b, ci95: e_b_ci95 },
         e_s: e_s.map(|e_s| e_s.times(whole.e_s / scale)),
         turn_ratio: Interval::of(&turn),
@@ -277,7 +279,9 @@ impl Angles {
             Spread::of(&values)
         };
         let half = match (sums(&stage.clockwise, 1.0), sums(&stage.counter_clockwise, -1.0)) {
-            (Some(clockwise), Some(counter)) => clockwise.half_of_sum(&counter).map(|half| half / (8.0 * side_m)),
+            (Some(clockwise), Some(counter)) => {
+                clockwise.half_of_sum(&counter).map(|half| half / (8.0 * side_m))
+            }
             _ => None,
         };
         Self {

@@ -62,7 +62,11 @@ impl WheelFactors {
 
     /// The ratios that these factors correct.
     pub fn errors(self) -> WheelErrors {
-        WheelErrors { e_d: self.right / self.left, e_b: self.track, e_s: f64::midpoint(self.left, self.right) }
+        WheelErrors {
+            e_d: self.right / self.left,
+            e_b: self.track,
+            e_s: f64::midpoint(self.left, self.right),
+        }
     }
 
     /// These factors upon others.

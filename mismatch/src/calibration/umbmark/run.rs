@@ -142,7 +142,9 @@ impl Run {
         let after_m = path.iter().find(|at| at.time >= ended.time).map_or(0.0, |at| last.path_m - at.path_m);
         if before_m.max(after_m) > UNSEEN_M {
             return Err(refused(
-                format!("found {before_m:.3} m driven before the first true pose and {after_m:.3} m after the last"),
+                format!(
+                    "found {before_m:.3} m driven before the first true pose and {after_m:.3} m after the last"
+                ),
                 "measure the poses at standstill, before the start and after the end, with stamps of the same clock",
             ));
         }
@@ -162,13 +164,7 @@ impl Run {
                 ));
             }
         }
-        Ok(Self {
-            recording: recording.name.clone(),
-            kind,
-            model,
-            odometry: own.odometry.clone(),
-            truth,
-        })
+        Ok(Self { recording: recording.name.clone(), kind, model, odometry: own.odometry.clone(), truth })
     }
 
     /// The robot's wheels are no part of the model it was declared with.
@@ -205,7 +201,11 @@ fn kind(path: &[Reckoned], last: &Reckoned) -> Result<Kind, (String, &'static st
     }
     if last.path_m < LEAST_AROUND_M {
         return Err((
-            format!("found a path of {:.2} m that turns by {:.0} degrees", last.path_m, turned_rad.to_degrees()),
+            format!(
+                "found a path of {:.2} m that turns by {:.0} degrees",
+                last.path_m,
+                turned_rad.to_degrees()
+            ),
             "a square is at least 2 m around (4 m a side in the original), a straight line 1 m, a turn on the spot 90 \
              degrees wide: drive one of them",
         ));
@@ -226,7 +226,10 @@ fn kind(path: &[Reckoned], last: &Reckoned) -> Result<Kind, (String, &'static st
         let [x_m, y_m] = [at.pose.x_m, at.pose.y_m];
         if (x_m - x * side_m).hypot(y_m - y * side_m) > CORNER_WITHIN * side_m {
             return Err((
-                format!("found the robot at ({x_m:.2}, {y_m:.2}) m after {driven_m:.2} m of {:.2} m", last.path_m),
+                format!(
+                    "found the robot at ({x_m:.2}, {y_m:.2}) m after {driven_m:.2} m of {:.2} m",
+                    last.path_m
+                ),
                 "a run starts at a corner, drives the first side straight ahead and turns on the spot at corners; all \
                  sides have the same length",
             ));

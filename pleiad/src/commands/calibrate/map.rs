@@ -41,7 +41,9 @@ pub fn run(args: &MapArgs) -> anyhow::Result<()> {
     let half = 0.5 * rot_rad_m * own.track_width;
     let errors = WheelErrors { e_d: (1.0 + half) / (1.0 - half), e_b: 1.0 + trans, e_s: 1.0 + trans };
     *own = corrected(own, errors.factors().upon(believed(&own.effects)), [None; 3]);
-    let comment = format!("The nominal model of robot {robot} with what `pleiad calibrate map` found. SI units, radians.");
+    let comment = format!(
+        "The nominal model of robot {robot} with what `pleiad calibrate map` found. SI units, radians."
+    );
     write_model(&out.join("corrected.toml"), &model, &comment)?;
     study::show(&page(&recording.name, &calibration, &options), &out, args.json, &command_line())
 }

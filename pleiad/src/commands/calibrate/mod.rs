@@ -21,7 +21,8 @@ fn robot(asked: Option<u32>, recordings: &[Recording]) -> anyhow::Result<RobotId
     if let Some(robot) = asked {
         return Ok(RobotId(robot));
     }
-    let mut robots: Vec<RobotId> = recordings.iter().flat_map(|recording| recording.robots.keys().copied()).collect();
+    let mut robots: Vec<RobotId> =
+        recordings.iter().flat_map(|recording| recording.robots.keys().copied()).collect();
     robots.sort_unstable();
     robots.dedup();
     match robots.as_slice() {

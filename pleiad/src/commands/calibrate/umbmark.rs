@@ -78,7 +78,9 @@ fn recorded(args: &UmbmarkArgs) -> anyhow::Result<()> {
 fn known(recordings: &[Recording], robot: RobotId) -> anyhow::Result<WheelFactors> {
     let mut declared = None;
     for recording in recordings {
-        let Some(own) = recording.nominal.as_ref().and_then(|nominal| nominal.robots.get(&robot)) else { continue };
+        let Some(own) = recording.nominal.as_ref().and_then(|nominal| nominal.robots.get(&robot)) else {
+            continue;
+        };
         let here = (own.wheel_radius, own.track_width, believed(&own.effects));
         match declared {
             None => declared = Some((here, &recording.name)),
