@@ -12,6 +12,7 @@ mod actuator;
 mod agitation;
 mod body;
 mod builtin;
+pub mod calibration;
 mod channel;
 mod commanded;
 mod compare;

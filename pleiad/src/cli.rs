@@ -1,6 +1,7 @@
 //! The command line, as clap sees it.
 
 mod slam;
+mod calibrate;
 mod survey;
 mod values;
 
@@ -12,6 +13,7 @@ use pleiad_estimation::strategy::StrategyKind;
 use pleiad_sim_peers::scenario::ManoeuvreKind;
 
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
+pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
 pub use survey::SurveyArgs;
 pub use values::{AbsoluteArg, LandmarksArg};
 
@@ -46,6 +48,9 @@ pub enum Command {
     Survey(SurveyArgs),
     /// Vehicle and map at once: EKF SLAM on a scenario or a recording.
     Slam(SlamArgs),
+    /// Odometry calibrated by published procedures: squares in both directions, scans against a map.
+    #[command(subcommand)]
+    Calibrate(Calibrate),
     /// The physics a simulation can leave out: names, parameters, equations.
     Effects(EffectsArgs),
     /// One robot's agent.

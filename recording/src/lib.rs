@@ -35,6 +35,6 @@ pub use nominal::{read_nominal, write_nominal};
 pub use open::open;
 pub use report::{FileReport, Form, Gaps, IngestReport, SkippedRow};
 pub use types::{
-    Command, Nominal, NominalNoise, NominalRangeSensor, NominalRobot, Recording, RobotRecording, SteerSample,
-    TruthSample,
+    BeamSample, Command, Nominal, NominalNoise, NominalRangeSensor, NominalRobot, Recording, RobotRecording,
+    SteerSample, TruthSample,
 };

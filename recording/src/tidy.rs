@@ -4,7 +4,7 @@ use pleiad_estimation::Timestamp;
 use pleiad_estimation::sample::{Reading, Relative, Sample};
 
 use crate::report::{FileReport, Gaps};
-use crate::types::{Command, SteerSample, TruthSample};
+use crate::types::{BeamSample, Command, SteerSample, TruthSample};
 
 /// A row with a stamp.
 pub(crate) trait Stamped: Copy + PartialEq {
@@ -32,6 +32,17 @@ impl Stamped for SteerSample {
 impl Stamped for TruthSample {
     fn time(&self) -> Timestamp {
         self.time
+    }
+}
+
+impl Stamped for BeamSample {
+    fn time(&self) -> Timestamp {
+        self.time
+    }
+
+    /// A scan has one beam in a direction.
+    fn same_place(&self, other: &Self) -> bool {
+        self.bearing_rad.to_bits() == other.bearing_rad.to_bits()
     }
 }
 

@@ -15,6 +15,8 @@ pub struct Recording {
     pub name: String,
     /// The map: landmark positions, metres.
     pub landmarks: BTreeMap<LandmarkId, [f64; 2]>,
+    /// Walls of the map, for range scans: segments `[x0, y0, x1, y1]`, metres.
+    pub walls: Vec<[f64; 4]>,
     /// What the nominal simulation believes; `None` if the recording does not say.
     pub nominal: Option<Nominal>,
     /// One recording per robot.
@@ -38,6 +40,8 @@ pub struct RobotRecording {
     pub sightings: Vec<Sample>,
     /// Steering angles; empty unless the robot steers its wheels.
     pub steer: Vec<SteerSample>,
+    /// Beams of range scans that met something; those of one scan share its stamp.
+    pub scans: Vec<BeamSample>,
     /// Ground truth, for judging only: no estimator ever sees it.
     pub truth: Vec<TruthSample>,
 }
@@ -60,6 +64,17 @@ pub struct SteerSample {
     pub time: Timestamp,
     /// Counter-clockwise from straight ahead, radians.
     pub angle_rad: f64,
+}
+
+/// One beam of a range scan that met something.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BeamSample {
+    /// When the scan was taken.
+    pub time: Timestamp,
+    /// Direction in the body frame, radians.
+    pub bearing_rad: f64,
+    /// How far, metres.
+    pub range_m: f64,
 }
 
 /// Where the robot really was.

@@ -18,6 +18,7 @@ impl Recording {
         Self {
             name: self.name.clone(),
             landmarks: self.landmarks.clone(),
+            walls: self.walls.clone(),
             nominal: self.nominal.clone(),
             robots,
         }
@@ -71,6 +72,7 @@ impl RobotRecording {
             heading: part(&self.heading, start, end),
             sightings: part(&self.sightings, start, end),
             steer: part(&self.steer, start, end),
+            scans: part(&self.scans, start, end),
             truth: part(&self.truth, start, end),
         }
     }

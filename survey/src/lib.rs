@@ -5,17 +5,27 @@
 //! is simulated or filtered here by means of its own.
 
 mod error;
+pub mod map;
 mod monte_carlo;
 pub mod slam;
 mod study;
+pub mod umbmark;
 
 pub use error::SurveyError;
 pub use monte_carlo::{Estimate, over_seeds, share};
 pub use study::{Claim, Known, Shown, Study, StudyOptions};
 
 /// The studies of `pleiad survey`, in the order of the survey's sections.
-pub const STUDIES: &[Known] = &[Known {
-    name: "slam",
-    about: "EKF SLAM: what a map converges to, what the choice of the error does to it, association, bearings alone",
-    run: slam::study,
-}];
+pub const STUDIES: &[Known] = &[
+    Known {
+        name: "umbmark",
+        about: "systematic odometry errors from squares in both directions",
+        run: umbmark::run,
+    },
+    Known { name: "map", about: "odometry errors per metre from range scans against a map", run: map::run },
+    Known {
+        name: "slam",
+        about: "EKF SLAM: what a map converges to, what the choice of the error does to it, association, bearings alone",
+        run: slam::study,
+    },
+];

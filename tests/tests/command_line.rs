@@ -4,6 +4,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 #![allow(clippy::float_cmp, reason = "counts, which JSON knows as numbers")]
 
+#[path = "command_line/calibrate.rs"]
+mod calibrate;
 #[path = "command_line/demo.rs"]
 mod demo;
 #[path = "command_line/errors.rs"]

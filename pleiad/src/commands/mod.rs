@@ -1,6 +1,7 @@
 //! The subcommands.
 
 mod agent;
+mod calibrate;
 mod concealed;
 mod coordinator;
 mod demo;
@@ -36,6 +37,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Faults(args) => faults::run(&args),
         Command::Slam(args) => slam::run(&args),
         Command::Survey(args) => survey::run(&args),
+        Command::Calibrate(command) => calibrate::run(&command),
         Command::Effects(args) => effects::run(&args),
         Command::Agent(args) => agent::run(&args),
         Command::Coordinator(args) => coordinator::run(&args),

@@ -13,8 +13,7 @@ use crate::output;
 /// Writes `report.html` and `summary.json` into the folder and prints the study. An error if a claim does not hold:
 /// a script should notice.
 pub fn finish(study: &Study, out: &Path, as_json: bool, command: &str) -> anyhow::Result<()> {
-    let summary = write(study, out, command)?;
-    output::print(as_json, &summary, &text(study, out))?;
+    show(study, out, as_json, command)?;
     let failed = study.claims.iter().filter(|claim| !claim.holds).count();
     if failed > 0 {
         bail!("{}: {failed} of {} claims do not hold", study.name, study.claims.len());
@@ -26,8 +25,19 @@ pub fn finish(study: &Study, out: &Path, as_json: bool, command: &str) -> anyhow
 pub fn write(study: &Study, out: &Path, command: &str) -> anyhow::Result<Value> {
     let summary = summary(study);
     write_summary(&out.join("summary.json"), &summary)?;
-    page(study, command).write(&out.join("report.html"))?;
+    write_page(study, out, command)?;
     Ok(summary)
+}
+
+/// The same for a command whose product is something else than its claims: they are shown, whatever they say.
+pub fn show(study: &Study, out: &Path, as_json: bool, command: &str) -> anyhow::Result<()> {
+    let summary = write(study, out, command)?;
+    output::print(as_json, &summary, &text(study, out))
+}
+
+/// The page alone, `report.html`.
+pub fn write_page(study: &Study, out: &Path, command: &str) -> anyhow::Result<()> {
+    Ok(page(study, command).write(&out.join("report.html"))?)
 }
 
 fn summary(study: &Study) -> Value {

@@ -23,6 +23,10 @@ pub use write::{Overwrite, write_folder};
 const LANDMARKS: &str = "landmarks.csv";
 const LANDMARK_COLUMNS: [&str; 3] = ["id", "x", "y"];
 
+/// Walls of the map.
+const WALLS: &str = "walls.csv";
+const WALL_COLUMNS: [&str; 4] = ["x0", "y0", "x1", "y1"];
+
 /// What the nominal simulation believes.
 const NOMINAL: &str = "nominal.toml";
 
@@ -43,10 +47,11 @@ const GPS: Channel = Channel { name: "gps", columns: &["t", "x", "y"] };
 const HEADING: Channel = Channel { name: "heading", columns: &["t", "heading"] };
 const RELATIVE: Channel = Channel { name: "relative", columns: &["t", "target_kind", "target_id"] };
 const STEER: Channel = Channel { name: "steer", columns: &["t", "steer_rad"] };
+const SCAN: Channel = Channel { name: "scan", columns: &["t", "bearing", "range"] };
 const TRUTH: Channel = Channel { name: "truth", columns: &["t", "x", "y", "heading"] };
 
-const CHANNELS: [Channel; 10] =
-    [COMMAND, WHEELS, VELOCITY, INCREMENT, GYRO, GPS, HEADING, RELATIVE, STEER, TRUTH];
+const CHANNELS: [Channel; 11] =
+    [COMMAND, WHEELS, VELOCITY, INCREMENT, GYRO, GPS, HEADING, RELATIVE, STEER, SCAN, TRUTH];
 /// A robot has odometry of one kind.
 const ODOMETRY: [Channel; 3] = [WHEELS, VELOCITY, INCREMENT];
 

@@ -8,7 +8,8 @@ use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use super::manifest::Manifest;
 use super::{
     CHANNELS, COMMAND, Channel, GPS, GYRO, HEADING, INCREMENT, LANDMARK_COLUMNS, LANDMARKS, NOMINAL,
-    ODOMETRY, RELATIVE, STEER, TRUTH, VELOCITY, WHEELS, robot_folder, robots_of, sightings,
+    ODOMETRY, RELATIVE, SCAN, STEER, TRUTH, VELOCITY, WALL_COLUMNS, WALLS, WHEELS, robot_folder, robots_of,
+    sightings,
 };
 use crate::error::RecordingError;
 use crate::ingest::{Ingest, Presence, ReadOptions};
@@ -16,7 +17,7 @@ use crate::nominal::read_nominal;
 use crate::open::{entries, recording_name, warn_of_unmapped_targets};
 use crate::report::{Form, IngestReport};
 use crate::table::{Row, Table};
-use crate::types::{Command, Recording, RobotRecording, SteerSample, TruthSample};
+use crate::types::{BeamSample, Command, Recording, RobotRecording, SteerSample, TruthSample};
 
 /// Reads a recording folder.
 ///
@@ -46,6 +47,14 @@ pub fn read_folder(
         )?;
     } else {
         ingest.warn(format!("{LANDMARKS}: missing; the recording has no map"));
+    }
+    if let Some(table) = Table::open_csv(folder, WALLS, &WALL_COLUMNS, &[])? {
+        let walls = ingest.map(
+            &table,
+            |row, line| Ok((line, [row.number(0)?, row.number(1)?, row.number(2)?, row.number(3)?])),
+            |_, line| format!("the wall stands in line {line} already"),
+        )?;
+        recording.walls = walls.into_values().collect();
     }
     for &robot in &robots {
         let read = read_robot(&mut ingest, robot)?;
@@ -97,6 +106,13 @@ fn read_robot(ingest: &mut Ingest<'_>, robot: RobotId) -> Result<RobotRecording,
     let steer = read_channel(ingest, robot, STEER, &Presence::Optional, |row| {
         Ok(SteerSample { time: row.time(0)?, angle_rad: row.number(1)? })
     })?;
+    let scans = read_channel(ingest, robot, SCAN, &Presence::Optional, |row| {
+        let (bearing_rad, range_m) = (row.number(1)?, row.number(2)?);
+        if range_m <= 0.0 {
+            return Err("a range above 0; a beam that met nothing has no row".to_owned());
+        }
+        Ok(BeamSample { time: row.time(0)?, bearing_rad, range_m })
+    })?;
     let truth = read_channel(ingest, robot, TRUTH, &Presence::Optional, |row| {
         Ok(TruthSample { time: row.time(0)?, pose: pose(row)? })
     })?;
@@ -111,6 +127,7 @@ fn read_robot(ingest: &mut Ingest<'_>, robot: RobotId) -> Result<RobotRecording,
         sightings: read_sightings(ingest, robot)?,
         commands,
         steer,
+        scans,
         truth,
     })
 }

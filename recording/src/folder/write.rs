@@ -10,7 +10,7 @@ use pleiad_estimation::{LandmarkId, Timestamp};
 use super::manifest::{self, Manifest};
 use super::{
     CHANNELS, COMMAND, Channel, GPS, GYRO, HEADING, INCREMENT, LANDMARK_COLUMNS, LANDMARKS, NOMINAL,
-    RELATIVE, STEER, TRUTH, VELOCITY, WHEELS, robot_folder, robots_of, sightings,
+    RELATIVE, SCAN, STEER, TRUTH, VELOCITY, WALL_COLUMNS, WALLS, WHEELS, robot_folder, robots_of, sightings,
 };
 use crate::error::RecordingError;
 use crate::nominal::{COMMENT, nominal_text};
@@ -90,7 +90,7 @@ fn clear(folder: &Path) -> Result<(), RecordingError> {
             std::fs::remove_dir(&path).map_err(RecordingError::io("remove", &path))?;
         }
     }
-    for file in [NOMINAL, LANDMARKS, manifest::FILE] {
+    for file in [NOMINAL, LANDMARKS, WALLS, manifest::FILE] {
         remove(file)?;
     }
     Ok(())
@@ -118,6 +118,18 @@ fn render(recording: &Recording) -> Result<Vec<(String, String)>, String> {
         landmarks.push('\n');
     }
     files.push((LANDMARKS.to_owned(), landmarks));
+    if !recording.walls.is_empty() {
+        let mut walls = WALL_COLUMNS.join(",") + "\n";
+        for wall in &recording.walls {
+            let mut row = String::new();
+            wall.iter()
+                .try_for_each(|&value| push_cell(&mut row, value))
+                .map_err(|what| format!("walls: {what}"))?;
+            walls.push_str(row.trim_start_matches(','));
+            walls.push('\n');
+        }
+        files.push((WALLS.to_owned(), walls));
+    }
     if let Some(nominal) = &recording.nominal {
         files.push((NOMINAL.to_owned(), nominal_text(nominal, COMMENT, Some(duration_s(recording)))?));
     }
@@ -165,6 +177,7 @@ fn render_robot(robot: &RobotRecording) -> Result<Vec<Rendered>, String> {
         })?,
         relative(&robot.sightings)?,
         table(STEER, &robot.steer, |steer| Some(vec![steer.angle_rad]))?,
+        table(SCAN, &robot.scans, |beam| Some(vec![beam.bearing_rad, beam.range_m]))?,
         table(TRUTH, &robot.truth, |truth| {
             Some(vec![truth.pose.x_m(), truth.pose.y_m(), truth.pose.yaw_rad()])
         })?,

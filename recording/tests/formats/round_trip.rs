@@ -7,8 +7,8 @@ use crate::common::{Folder, read_with};
 use pleiad_estimation::sample::{Reading, Relative, Sample, Target};
 use pleiad_estimation::{LandmarkId, Pose2, RobotId, Timestamp};
 use pleiad_recording::{
-    Command, Nominal, NominalRobot, Overwrite, ReadOptions, Recording, RobotRecording, SteerSample,
-    TruthSample, open, write_folder,
+    BeamSample, Command, Nominal, NominalRobot, Overwrite, ReadOptions, Recording, RobotRecording,
+    SteerSample, TruthSample, open, write_folder,
 };
 use proptest::collection::{btree_map, btree_set};
 use proptest::prelude::*;
@@ -80,11 +80,15 @@ fn robot() -> impl Strategy<Value = RobotRecording> {
     let steer = channel(number().boxed()).prop_map(|rows| {
         rows.into_iter().map(|(time, angle_rad)| SteerSample { time, angle_rad }).collect::<Vec<_>>()
     });
+    let scans = channel((number(), 1e-3..1e3).boxed()).prop_map(|rows| {
+        let beam = |(time, (bearing_rad, range_m))| BeamSample { time, bearing_rad, range_m };
+        rows.into_iter().map(beam).collect::<Vec<_>>()
+    });
     let gyro = samples(number().prop_map(|yaw_rate_rad_s| Reading::Gyro { yaw_rate_rad_s }).boxed());
     let heading = samples(number().prop_map(|heading_rad| Reading::Heading { heading_rad }).boxed());
     let gps = samples(two(|x_m, y_m| Reading::Gps { x_m, y_m }));
-    (odometry, commands, truth, gyro, heading, gps, samples(sighting()), steer).prop_map(
-        |(odometry, commands, truth, gyro, heading, gps, sightings, steer)| RobotRecording {
+    (odometry, commands, truth, gyro, heading, gps, samples(sighting()), steer, scans).prop_map(
+        |(odometry, commands, truth, gyro, heading, gps, sightings, steer, scans)| RobotRecording {
             odometry,
             commands,
             truth,
@@ -93,6 +97,7 @@ fn robot() -> impl Strategy<Value = RobotRecording> {
             gps,
             sightings,
             steer,
+            scans,
         },
     )
 }
@@ -100,9 +105,11 @@ fn robot() -> impl Strategy<Value = RobotRecording> {
 fn recording() -> impl Strategy<Value = Recording> {
     let landmarks = btree_map(any::<u32>().prop_map(LandmarkId), [number(), number()], 0..5);
     let robots = btree_map((0..9_u32).prop_map(RobotId), robot(), 1..4);
-    (".{0,12}", landmarks, robots).prop_map(|(name, landmarks, robots)| Recording {
+    let walls = proptest::collection::vec([number(), number(), number(), number()], 0..4);
+    (".{0,12}", landmarks, walls, robots).prop_map(|(name, landmarks, walls, robots)| Recording {
         name,
         landmarks,
+        walls,
         nominal: None,
         robots,
     })

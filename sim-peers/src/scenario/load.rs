@@ -41,6 +41,8 @@ pub(super) struct Document {
     #[serde(default)]
     random_landmarks: u32,
     #[serde(default)]
+    walls_m: Vec<[f64; 4]>,
+    #[serde(default)]
     landmarks: Vec<Landmark>,
     #[serde(default)]
     defaults: Table,
@@ -82,6 +84,7 @@ impl Document {
             truth_sigma_rad: 0.0,
             team_size: 0,
             random_landmarks: 0,
+            walls_m: vec![[0.0; 4]],
             landmarks: vec![Landmark { id: 0, x_m: 0.0, y_m: 0.0 }],
             defaults,
             robots: vec![robot],
@@ -159,6 +162,7 @@ impl Loader<'_> {
             truth_rate_hz: document.truth_rate_hz,
             truth_sigma_m: document.truth_sigma_m,
             truth_sigma_rad: document.truth_sigma_rad,
+            walls_m: document.walls_m,
             landmarks,
             random_landmarks: document.random_landmarks,
             robots,

@@ -20,7 +20,7 @@ pub use drive::{DriveKind, DriveSettings};
 pub use manoeuvre::{ManoeuvreKind, UnknownManoeuvre};
 pub use settings::{
     Direction, Gps, Gyro, Heading, LastingSlip, Motion, MotionNoise, Odometry, OdometryKind, Policy,
-    PriorSettings, RelativeKind, RelativeSensor, RobotSettings, See, Start,
+    PriorSettings, RangeScan, RelativeKind, RelativeSensor, RobotSettings, See, Start,
 };
 
 /// A simulation to run: complete, with the defaults already applied to every robot.
@@ -42,6 +42,8 @@ pub struct Scenario {
     pub truth_sigma_rad: f64,
     /// Landmarks at given places, metres.
     pub landmarks: BTreeMap<LandmarkId, [f64; 2]>,
+    /// Walls that range scans meet: segments `[x0, y0, x1, y1]`, metres. They do not stop robots.
+    pub walls_m: Vec<[f64; 4]>,
     /// Further landmarks at random places, numbered on from the largest given one.
     pub random_landmarks: u32,
     /// The team.

@@ -51,6 +51,8 @@ pub struct RobotSettings {
     pub heading: Heading,
     /// What it sees of other robots and landmarks.
     pub relative: RelativeSensor,
+    /// Its range scanner.
+    pub scan: RangeScan,
     /// Slip, gyro, GPS and heading have noise of Student's distribution with so many degrees of freedom, above
     /// 2, and the standard deviations given; 0: normal.
     pub noise_degrees_of_freedom: f64,
@@ -78,6 +80,7 @@ impl Default for RobotSettings {
             gps: Gps::default(),
             heading: Heading::default(),
             relative: RelativeSensor::default(),
+            scan: RangeScan::default(),
             noise_degrees_of_freedom: 0.0,
         }
     }
@@ -413,6 +416,28 @@ impl Default for RelativeSensor {
             sigma_yaw_rad: 0.03,
             drop_out: 0.0,
         }
+    }
+}
+
+/// A ring of range beams at the body's origin: a lidar, or sonars around a robot.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RangeScan {
+    /// Rate of scans, Hz; 0 means none.
+    pub rate_hz: f64,
+    /// Beams of a scan, evenly over the field of view.
+    pub beams: u32,
+    /// Half the field of view, radians; pi means all around.
+    pub half_fov_rad: f64,
+    /// Walls farther than this are not met, metres.
+    pub max_range_m: f64,
+    /// Noise of a range, metres.
+    pub sigma_m: f64,
+}
+
+impl Default for RangeScan {
+    fn default() -> Self {
+        Self { rate_hz: 0.0, beams: 72, half_fov_rad: std::f64::consts::PI, max_range_m: 8.0, sigma_m: 0.02 }
     }
 }
 

@@ -13,6 +13,9 @@ const LEAST_ODOMETRY_HZ: f64 = 5.0;
 /// No channel is faster, Hz.
 const GREATEST_RATE_HZ: f64 = 1000.0;
 
+/// More beams to a scan would be a picture.
+const GREATEST_BEAMS: f64 = 10_000.0;
+
 /// A wheel steered farther than this would not roll, radians.
 const GREATEST_STEER_RAD: f64 = 1.5;
 
@@ -56,6 +59,9 @@ impl Scenario {
                 return Err(team.invalid("landmarks", &found, "finite coordinates"));
             }
         }
+        if let Some(wall) = self.walls_m.iter().find(|wall| !wall.iter().all(|end| end.is_finite())) {
+            return Err(team.invalid("walls_m", &format!("{wall:?}"), "[x0, y0, x1, y1], finite"));
+        }
         for (robot, settings) in &self.robots {
             let check = Check { robot: Some(*robot) };
             if robot.0 == 0 {
@@ -66,6 +72,7 @@ impl Scenario {
             check.motion(settings)?;
             check.sensors(settings)?;
             check.relative(settings)?;
+            check.scan(settings)?;
         }
         Ok(())
     }
@@ -202,6 +209,16 @@ impl Check {
         self.above_zero("relative.half_fov_rad", relative.half_fov_rad)?;
         self.between("relative.half_fov_rad", relative.half_fov_rad, 0.0, PI + 1e-4)?;
         self.between("relative.drop_out", relative.drop_out, 0.0, 1.0)
+    }
+
+    fn scan(&self, settings: &RobotSettings) -> Result<(), Invalid> {
+        let scan = &settings.scan;
+        self.rate("scan.rate_hz", scan.rate_hz, 0.0)?;
+        self.between("scan.beams", f64::from(scan.beams), 1.0, GREATEST_BEAMS)?;
+        self.above_zero("scan.half_fov_rad", scan.half_fov_rad)?;
+        self.between("scan.half_fov_rad", scan.half_fov_rad, 0.0, PI + 1e-4)?;
+        self.above_zero("scan.max_range_m", scan.max_range_m)?;
+        self.not_negative("scan.sigma_m", scan.sigma_m)
     }
 
     fn finite(&self, key: &str, value: f64) -> Result<(), Invalid> {

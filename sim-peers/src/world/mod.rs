@@ -15,6 +15,7 @@ mod nominal;
 mod placement;
 mod policy;
 mod random;
+mod scan;
 mod sensors;
 mod sighting;
 mod slip;
@@ -105,6 +106,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<SimulatedRun, Error> {
             heading: channels.heading(),
             sightings: sighting::sightings(&channels, &tracks, &landmarks),
             steer: channels.steer(),
+            scans: scan::scans(&channels, &scenario.walls_m),
             truth: channels.truth(scenario.truth_rate_hz, scenario.truth_sigma_m, scenario.truth_sigma_rad),
             commands: channels.commands(),
         };
@@ -114,6 +116,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<SimulatedRun, Error> {
     let recording = Recording {
         name: scenario.name.clone(),
         landmarks,
+        walls: scenario.walls_m.clone(),
         nominal: Some(nominal::nominal(scenario)),
         robots,
     };
@@ -123,9 +126,11 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<SimulatedRun, Error> {
 
 /// Brings every channel into the order of its stamps, which a clock that is set back loses.
 fn sort(recorded: &mut RobotRecording) {
-    let RobotRecording { commands, odometry, gyro, gps, heading, sightings, steer, truth: _ } = recorded;
+    let RobotRecording { commands, odometry, gyro, gps, heading, sightings, steer, scans, truth: _ } =
+        recorded;
     commands.sort_by_key(|command| command.time);
     steer.sort_by_key(|steer| steer.time);
+    scans.sort_by_key(|beam| beam.time);
     for channel in [odometry, gyro, gps, heading, sightings] {
         channel.sort_by_key(|sample| sample.time);
     }

@@ -39,6 +39,8 @@ pub(super) enum Channel {
     Lasting = 17,
     /// The spread of heavy-tailed noise of a robot's own channels: an item per channel.
     OwnTails = 18,
+    /// Noise of range scans.
+    Scan = 19,
 }
 
 /// Ends every key, so that no other use of a bare seed shares a stream with the world.
