@@ -5,6 +5,7 @@
 //! is simulated or filtered here by means of its own.
 
 mod error;
+pub mod hypotheses;
 mod monte_carlo;
 mod study;
 
@@ -13,4 +14,10 @@ pub use monte_carlo::{Estimate, over_seeds, share};
 pub use study::{Claim, Known, Shown, Study, StudyOptions};
 
 /// The studies of `pleiad survey`, in the order of the survey's sections.
-pub const STUDIES: &[Known] = &[];
+pub const STUDIES: &[Known] = &[
+    Known {
+        name: hypotheses::NAME,
+        about: "several hypotheses on a map of look-alike landmarks",
+        run: hypotheses::study,
+    },
+];

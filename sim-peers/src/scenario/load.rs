@@ -57,6 +57,8 @@ struct Landmark {
     id: u32,
     x_m: f64,
     y_m: f64,
+    #[serde(default)]
+    kind: u32,
 }
 
 /// Seed of a scenario that names none.
@@ -82,7 +84,7 @@ impl Document {
             truth_sigma_rad: 0.0,
             team_size: 0,
             random_landmarks: 0,
-            landmarks: vec![Landmark { id: 0, x_m: 0.0, y_m: 0.0 }],
+            landmarks: vec![Landmark { id: 0, x_m: 0.0, y_m: 0.0, kind: 0 }],
             defaults,
             robots: vec![robot],
             fault: Vec::new(),
@@ -143,8 +145,10 @@ impl Loader<'_> {
             robots.insert(id, self.settings(&document.defaults, Some((&own, &path)))?);
         }
         let mut landmarks = BTreeMap::new();
+        let mut landmark_kinds = BTreeMap::new();
         for (index, landmark) in document.landmarks.iter().enumerate() {
             let position = [landmark.x_m, landmark.y_m];
+            landmark_kinds.insert(LandmarkId(landmark.id), landmark.kind);
             if landmarks.insert(LandmarkId(landmark.id), position).is_some() {
                 let path = format!("landmarks[{index}].id");
                 let found = format!("{} again", landmark.id);
@@ -160,6 +164,7 @@ impl Loader<'_> {
             truth_sigma_m: document.truth_sigma_m,
             truth_sigma_rad: document.truth_sigma_rad,
             landmarks,
+            landmark_kinds,
             random_landmarks: document.random_landmarks,
             robots,
             faults,
