@@ -7,6 +7,7 @@
 mod error;
 pub mod hypotheses;
 mod monte_carlo;
+pub mod motion_policies;
 mod study;
 
 pub use error::SurveyError;
@@ -19,5 +20,10 @@ pub const STUDIES: &[Known] = &[
         name: hypotheses::NAME,
         about: "several hypotheses on a map of look-alike landmarks",
         run: hypotheses::study,
+    },
+    Known {
+        name: motion_policies::NAME,
+        about: "rules of motion for teams, beside the joint filter",
+        run: motion_policies::study,
     },
 ];

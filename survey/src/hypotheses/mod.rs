@@ -42,16 +42,16 @@ mod bound {
 }
 
 /// All runs of all seeds.
-pub(crate) struct Outcome {
-    pub kidnapped_at_s: f64,
-    pub duration_s: f64,
-    pub clean: Vec<Run>,
-    pub kidnapped: Vec<Run>,
-    pub without_reserve: Vec<Run>,
-    pub symmetric: Vec<Run>,
-    pub plain: Vec<f64>,
-    pub scenario: Scenario,
-    pub symmetric_scenario: Scenario,
+struct Outcome {
+    kidnapped_at_s: f64,
+    duration_s: f64,
+    clean: Vec<Run>,
+    kidnapped: Vec<Run>,
+    without_reserve: Vec<Run>,
+    symmetric: Vec<Run>,
+    plain: Vec<f64>,
+    scenario: Scenario,
+    symmetric_scenario: Scenario,
 }
 
 /// Runs the study.
@@ -75,7 +75,7 @@ pub fn study(options: &StudyOptions) -> Result<Study, SurveyError> {
     })
 }
 
-pub(crate) fn runs(options: &StudyOptions) -> Result<Outcome, SurveyError> {
+fn runs(options: &StudyOptions) -> Result<Outcome, SurveyError> {
     let count = options.seeds.unwrap_or(SEEDS);
     if count < LEAST_SEEDS {
         return Err(SurveyError::TooFewSeeds { study: NAME, found: count, least: LEAST_SEEDS });
@@ -122,12 +122,12 @@ fn mean(values: &[f64], unit: &str) -> String {
 
 impl Outcome {
     /// Time to convergence of the runs without kidnapping that did converge to the right place.
-    pub(crate) fn converged_s(&self) -> Vec<f64> {
+    fn converged_s(&self) -> Vec<f64> {
         self.clean.iter().filter_map(|run| run.settled_s(0.0, f64::INFINITY)).collect()
     }
 
     /// Time from the kidnapping until the right place was believed again.
-    pub(crate) fn recovered_s(&self, runs: &[Run]) -> Vec<f64> {
+    fn recovered_s(&self, runs: &[Run]) -> Vec<f64> {
         let at = self.kidnapped_at_s;
         runs.iter().filter_map(|run| Some(run.settled_s(at, f64::INFINITY)? - at)).collect()
     }
