@@ -12,8 +12,9 @@ fn look_alikes_are_told_apart_kidnapping_is_survived_and_a_symmetric_map_is_left
     assert!(hits("converged_share") >= 7, "{:?}", study.numbers);
     assert!(hits("recovered_share") >= 7, "{:?}", study.numbers);
     assert_eq!(number("strayed"), 0);
-    assert!(number("most_hypotheses") <= 512);
-    assert_eq!(number("symmetric_undecided"), 8);
+    // Without pruning and merging there are more: the number is not small by itself.
+    let mean = |name: &str| study.numbers[name]["mean"].as_f64().unwrap();
+    assert!(mean("mean_hypotheses_unpruned") > 3.0 * mean("mean_hypotheses"), "{:?}", study.numbers);
     assert!(study.numbers["plain_largest_difference"].as_f64().unwrap() < 1e-9);
     // The planted fault: nothing stands for `none of these`.
     assert!(number("recovered_without_reserve") <= 4, "{:?}", study.numbers);

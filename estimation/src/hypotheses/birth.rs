@@ -63,7 +63,7 @@ pub(super) fn around(
     let mut adjoint = turn.adjoint();
     // A turn of the frame alone: the lever arms of a pose at the origin are zero.
     adjoint[(2, 2)] = 0.0;
-    let covariance =
-        about * about.transpose() * (spread_rad * spread_rad) + adjoint * seen.covariance * adjoint.transpose();
+    let covariance = about * about.transpose() * (spread_rad * spread_rad)
+        + adjoint * seen.covariance * adjoint.transpose();
     (pose, covariance)
 }

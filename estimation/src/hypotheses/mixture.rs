@@ -151,7 +151,13 @@ impl Localizer {
     }
 
     /// A robot that is told its pose at a nominal state; `noise` is the covariance of `n` in `X exp(n)`.
-    pub fn told(map: KindedMap, settings: Settings, pose: &Pose2, noise: &Matrix3, at: &NominalState) -> Self {
+    pub fn told(
+        map: KindedMap,
+        settings: Settings,
+        pose: &Pose2,
+        noise: &Matrix3,
+        at: &NominalState,
+    ) -> Self {
         let mut joint = Joint::new(ErrorForm::Invariant);
         joint.place(ROBOT, BOOT, pose, noise, at);
         let hypotheses = vec![Hypothesis { joint, weight: 1.0 }];
@@ -246,8 +252,7 @@ impl Localizer {
     fn branches(&self, sighting: &Sighting<'_>, seen: &Seen, noise: &Matrix3) -> Vec<(f64, Branch)> {
         let mut branches = Vec::new();
         let said = |landmark: &MappedLandmark| sighting.recognition[landmark.kind.0];
-        let possible =
-            || self.map.landmarks.iter().enumerate().filter(|(_, landmark)| said(landmark) > 0.0);
+        let possible = || self.map.landmarks.iter().enumerate().filter(|(_, landmark)| said(landmark) > 0.0);
         for (index, hypothesis) in self.hypotheses.iter().enumerate() {
             let Some((pose, _)) = hypothesis.joint.estimate(ROBOT, &sighting.observer) else { continue };
             let covariance = hypothesis.joint.covariance().block(0, 0);
@@ -261,7 +266,8 @@ impl Localizer {
             }
         }
         if self.reserve > 0.0 {
-            let share = self.reserve * seen.area_per_unit / self.map.area_m2() / self.settings.headings as f64;
+            let share =
+                self.reserve * seen.area_per_unit / self.map.area_m2() / self.settings.headings as f64;
             for (landmark, of) in possible() {
                 let log_weight = libm::log(share * said(of));
                 let born = (0..self.settings.headings).map(|heading| Branch::Born { landmark, heading });

@@ -97,10 +97,8 @@ fn a_pose_outside_the_map_is_no_hypothesis() {
 fn merging_keeps_weight_mean_and_covariance() {
     // Turns alike: the invariant error of position is plain position, and moments are those of two Gaussians.
     let p = Matrix3::from_diagonal(&Vector3::new(0.04, 0.01, 1e-4));
-    let at = |x: f64, weight: f64| Hypothesis {
-        joint: joint_at(&Pose2::new(x, 0.0, 0.0), &p, &START, 0),
-        weight,
-    };
+    let at =
+        |x: f64, weight: f64| Hypothesis { joint: joint_at(&Pose2::new(x, 0.0, 0.0), &p, &START, 0), weight };
     let mut both = vec![at(0.0, 0.75), at(0.1, 0.25), at(8.0, 1e-3)];
     reduce(&mut both, &Settings::default());
     assert_eq!(both.len(), 2);
@@ -128,7 +126,8 @@ fn what_cannot_be_used_is_said_and_leaves_no_trace() {
     let kinds = localizer.sighted(&sighting(1.0, 2.0, 0.0, &[0.5, 0.5]));
     assert_eq!(kinds, Err(HypothesisError::Kinds { time, found: 2, kind: 2 }));
     let recognition = [1.0; 3];
-    let range = Sighting { relative: Relative::Range { range_m: 2.0 }, ..sighting(1.0, 2.0, 0.0, &recognition) };
+    let range =
+        Sighting { relative: Relative::Range { range_m: 2.0 }, ..sighting(1.0, 2.0, 0.0, &recognition) };
     assert_eq!(localizer.sighted(&range), Err(HypothesisError::NoPosition { time }));
     let noise = Noise::from_sigmas(&[0.1, 0.0]);
     let exact = Sighting { noise, ..sighting(1.0, 2.0, 0.0, &recognition) };

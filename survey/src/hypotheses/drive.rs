@@ -25,6 +25,8 @@ pub(super) const ROBOT: RobotId = RobotId(1);
 /// it was seen from.
 const RIGHT_M: f64 = 0.5;
 const RIGHT_RAD: f64 = 0.2;
+/// From this far it is another place: no two landmarks of the maps are nearer to each other.
+const ANOTHER_M: f64 = 2.0;
 /// Streams of chance beside those of the world.
 const RECOGNITION: u64 = 1;
 const DESTINATION: u64 = 2;
@@ -43,7 +45,11 @@ impl Recognition {
         let wrong = if self.kinds > 1 { (1.0 - self.right) / (self.kinds - 1) as f64 } else { 0.0 };
         let mut said = kind;
         if draw >= self.right && wrong > 0.0 {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of kinds")]
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "below the number of kinds"
+            )]
             let step = ((draw - self.right) / wrong) as usize;
             said = (kind + 1 + step.min(self.kinds - 2)) % self.kinds;
         }
@@ -108,7 +114,9 @@ impl World {
     }
 
     /// Landmark sightings with the nominal state at their time.
-    pub(super) fn sightings(&self) -> impl Iterator<Item = (Timestamp, NominalState, LandmarkId, Relative)> + '_ {
+    pub(super) fn sightings(
+        &self,
+    ) -> impl Iterator<Item = (Timestamp, NominalState, LandmarkId, Relative)> + '_ {
         let all = self.run.recording.robots.get(&ROBOT).into_iter().flat_map(|own| &own.sightings);
         all.filter_map(|sample| match sample.reading {
             Reading::Sighting { target: Target::Landmark(landmark), relative } => {
@@ -154,7 +162,10 @@ pub(super) fn map_of(scenario: &Scenario) -> KindedMap {
         kind: KindOfLandmark(scenario.landmark_kinds.get(id).map_or(0, |kind| *kind as usize)),
         position_m: Vector2::new(*x, *y),
     };
-    KindedMap { landmarks: scenario.landmarks.iter().map(landmark).collect(), bounds_m: scenario.arena.bounds_m() }
+    KindedMap {
+        landmarks: scenario.landmarks.iter().map(landmark).collect(),
+        bounds_m: scenario.arena.bounds_m(),
+    }
 }
 
 /// The scenario with its kidnapping drawn anew: anywhere in the map, with any heading.
@@ -234,7 +245,8 @@ pub(super) fn localize(
         let error = Vector3::new(offset.x, offset.y, turn);
         let covariance = heaviest.covariance.to_matrix();
         let dynamic = nalgebra::DMatrix::from_column_slice(3, 3, covariance.as_slice());
-        run.nees = nees(&nalgebra::DVector::from_column_slice(error.as_slice()), &dynamic).unwrap_or(f64::NAN);
+        run.nees =
+            nees(&nalgebra::DVector::from_column_slice(error.as_slice()), &dynamic).unwrap_or(f64::NAN);
     }
     Ok(run)
 }
@@ -285,12 +297,21 @@ impl Run {
 
     /// Whether another place was believed after the right one had been.
     pub(super) fn strayed(&self) -> bool {
-        let after = self.moments.iter().skip_while(|moment| !(moment.one && moment.right));
-        after.into_iter().any(|moment| moment.one && !moment.right)
+        self.farthest_believed_m() > ANOTHER_M
     }
 
-    /// Whether a wrong place was ever believed.
+    /// Largest distance from the truth of any place that was believed after the right one had been, metres.
+    pub(super) fn farthest_believed_m(&self) -> f64 {
+        let after = self.moments.iter().skip_while(|moment| !(moment.one && moment.right));
+        let off = after
+            .filter(|moment| moment.one)
+            .map(|moment| (moment.pose.position() - moment.truth.position()).norm());
+        off.fold(0.0, f64::max)
+    }
+
+    /// Whether another place was ever believed.
     pub(super) fn ever_wrong(&self) -> bool {
-        self.moments.iter().any(|moment| moment.one && !moment.right)
+        let off = |moment: &Moment| (moment.pose.position() - moment.truth.position()).norm();
+        self.moments.iter().any(|moment| moment.one && off(moment) > ANOTHER_M)
     }
 }

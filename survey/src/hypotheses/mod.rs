@@ -24,6 +24,10 @@ const SEEDS: usize = 100;
 const LEAST_SEEDS: usize = 4;
 /// Runs compared with the plain filter.
 const PLAIN_RUNS: usize = 10;
+/// Runs without pruning and merging.
+const UNPRUNED_RUNS: usize = 2;
+/// So many hypotheses are allowed by the default settings.
+const ALLOWED: usize = 512;
 
 /// Bounds of the claims, fixed before the seeds of the study were run.
 mod bound {
@@ -33,8 +37,10 @@ mod bound {
     pub const FAILED: f64 = 0.05;
     /// Largest share that recover without a reserve; the upper end.
     pub const WITHOUT_RESERVE: f64 = 0.5;
-    /// Largest number of hypotheses after a sighting, of 512 allowed.
-    pub const MOST: usize = 512;
+    /// Largest mean number of hypotheses over a run, upper end; of 512 allowed.
+    pub const KEPT: f64 = 50.0;
+    /// Without pruning and merging there are at least so many times as many.
+    pub const TIMES: f64 = 3.0;
     /// Largest difference to the plain filter.
     pub const PLAIN: f64 = 1e-9;
     /// Weights of a pose and its image on the symmetric map.
@@ -49,6 +55,7 @@ struct Outcome {
     kidnapped: Vec<Run>,
     without_reserve: Vec<Run>,
     symmetric: Vec<Run>,
+    unpruned: Vec<Run>,
     plain: Vec<f64>,
     scenario: Scenario,
     symmetric_scenario: Scenario,
@@ -90,6 +97,7 @@ fn runs(options: &StudyOptions) -> Result<Outcome, SurveyError> {
     let kidnapped_at_s = kidnapped_at_s.fold(f64::INFINITY, f64::min);
     let seeds: Vec<u64> = (0..count as u64).map(|k| options.first_seed.saturating_add(k)).collect();
     let usual = Settings::default();
+    let unpruned = Settings { least_weight: 0.0, merge_below: 0.0, ..usual };
     let no_reserve = Settings { carried_off_hz: 0.0, ..usual };
     let clean = left_alone(&scenario);
     let (scenario_of, first) = (&scenario, options.first_seed);
@@ -103,6 +111,7 @@ fn runs(options: &StudyOptions) -> Result<Outcome, SurveyError> {
         kidnapped: over_seeds(&seeds, |seed| run(&carried_off(scenario_of, seed), seed, usual))?,
         without_reserve: over_seeds(&seeds, |seed| run(&carried_off(scenario_of, seed), seed, no_reserve))?,
         symmetric: over_seeds(&seeds, |seed| run(&symmetric_scenario, seed, usual))?,
+        unpruned: over_seeds(&seeds[..UNPRUNED_RUNS.min(count)], |seed| run(&clean, seed, unpruned))?,
         plain: over_seeds(&seeds[..PLAIN_RUNS.min(count)], |seed| plain::difference(&clean, seed))?,
         symmetric_scenario,
         scenario,
@@ -117,7 +126,8 @@ fn of_runs(hits: usize, of: usize) -> String {
 
 /// A mean over runs in words.
 fn mean(values: &[f64], unit: &str) -> String {
-    Estimate::of(values).map_or_else(|| "too few to say".to_owned(), |own| with_interval(own.mean, own.interval, unit))
+    Estimate::of(values)
+        .map_or_else(|| "too few to say".to_owned(), |own| with_interval(own.mean, own.interval, unit))
 }
 
 impl Outcome {
@@ -142,18 +152,29 @@ impl Outcome {
         all.into_iter().flatten().map(|run| run.most).max().unwrap_or(0)
     }
 
+    /// Mean number of hypotheses over each of some runs.
+    fn kept(runs: &[Run]) -> Vec<f64> {
+        let mean = |run: &Run| {
+            run.moments.iter().map(|moment| moment.count as f64).sum::<f64>()
+                / run.moments.len().max(1) as f64
+        };
+        runs.iter().map(mean).collect()
+    }
+
     /// Runs on the symmetric map that keep the pose and its image at like weights in the end.
     fn undecided(&self) -> usize {
         let [low, high] = bound::IMAGE;
         let like = |weight: f64| (low..=high).contains(&weight);
-        let kept = |run: &&Run| run.moments.last().is_some_and(|last| like(last.at_truth) && like(last.at_image));
+        let kept =
+            |run: &&Run| run.moments.last().is_some_and(|last| like(last.at_truth) && like(last.at_image));
         self.symmetric.iter().filter(kept).count()
     }
 
     /// Average NEES per degree of freedom of the winners that are right, and where it lies with 99 % were they
     /// consistent.
     fn anees(&self) -> (f64, [f64; 2]) {
-        let winners = self.clean.iter().filter(|run| run.moments.last().is_some_and(|last| last.one && last.right));
+        let winners =
+            self.clean.iter().filter(|run| run.moments.last().is_some_and(|last| last.one && last.right));
         let values: Vec<f64> = winners.map(|run| run.nees).collect();
         let degrees = 3.0 * values.len() as f64;
         let (low, high) = chi_square_interval(degrees, 0.01);
@@ -179,20 +200,24 @@ fn claims(outcome: &Outcome) -> Vec<Claim> {
     let errors: Vec<f64> = outcome.clean.iter().map(|run| run.error_m).collect();
     let (anees, [low, high]) = outcome.anees();
     let most = outcome.most();
+    let [kept, unpruned] = [&outcome.clean, &outcome.unpruned].map(|runs| Outcome::kept(runs));
+    let [own, without] = [&kept, &unpruned].map(|counts| Estimate::of(counts));
+    let few = own.is_some_and(|own| own.interval[1] < bound::KEPT);
+    let many = own.zip(without).is_some_and(|(own, without)| without.mean > bound::TIMES * own.mean);
     vec![
         claim(
             "From a uniform start over a map of look-alikes it converges to one hypothesis, the right one",
-            format!(
-                "{}; after {}",
-                of_runs(converged.len(), of),
-                mean(&converged, "s")
-            ),
+            format!("{}; after {}", of_runs(converged.len(), of), mean(&converged, "s")),
             share(converged.len(), of)[0] > bound::CONVERGED,
         ),
         claim(
-            "The number of hypotheses stays bounded",
-            format!("at most {most} after any sighting of {} runs; {} are allowed", 4 * of, bound::MOST),
-            most <= bound::MOST,
+            "Pruning and merging keep few hypotheses; without them there are many times as many",
+            format!(
+                "mean over a run {}, never more than {most} of {ALLOWED}; without them {}",
+                mean(&kept, ""),
+                mean(&unpruned, "")
+            ),
+            few && many,
         ),
         claim(
             "A robot that is carried off finds itself again",
@@ -220,7 +245,11 @@ fn claims(outcome: &Outcome) -> Vec<Claim> {
         ),
         claim(
             "With recognition that is certain and a start that is told it is the plain filter",
-            format!("largest difference of any number over {} runs {}", outcome.plain.len(), quantity(plain, "")),
+            format!(
+                "largest difference of any number over {} runs {}",
+                outcome.plain.len(),
+                quantity(plain, "")
+            ),
             plain < bound::PLAIN,
         ),
         claim(
@@ -249,8 +278,12 @@ fn numbers(outcome: &Outcome) -> serde_json::Map<String, serde_json::Value> {
     put("recovered_after_s", json!(Estimate::of(&recovered)));
     put("recovered_without_reserve", json!(outcome.recovered_s(&outcome.without_reserve).len()));
     put("strayed", json!(outcome.clean.iter().filter(|run| run.strayed()).count()));
+    let farthest: Vec<f64> = outcome.clean.iter().map(Run::farthest_believed_m).collect();
+    put("farthest_believed_m", json!(farthest.iter().copied().fold(0.0, f64::max)));
     put("ever_wrong", json!(outcome.clean.iter().filter(|run| run.ever_wrong()).count()));
     put("most_hypotheses", json!(outcome.most()));
+    put("mean_hypotheses", json!(Estimate::of(&Outcome::kept(&outcome.clean))));
+    put("mean_hypotheses_unpruned", json!(Estimate::of(&Outcome::kept(&outcome.unpruned))));
     put("symmetric_undecided", json!(outcome.undecided()));
     put("plain_largest_difference", json!(outcome.plain.iter().copied().fold(0.0, f64::max)));
     put("anees", json!(outcome.anees().0));

@@ -36,7 +36,8 @@ pub(super) fn shown(outcome: &Outcome) -> Vec<Shown> {
     if let Some(run) = outcome.symmetric.first() {
         shown.push(Shown::Figure(
             ambiguous(run),
-            "The symmetric map, first run: the true place and its image under half a turn share all weight.".to_owned(),
+            "The symmetric map, first run: the true place and its image under half a turn share all weight."
+                .to_owned(),
         ));
         shown.push(Shown::Figure(
             map(&outcome.symmetric_scenario, run),
@@ -139,11 +140,13 @@ fn map(scenario: &Scenario, run: &Run) -> Figure {
     }
     let (ex, ey): (Vec<f64>, Vec<f64>) =
         run.moments.iter().map(|moment| (moment.pose.x_m(), moment.pose.y_m())).unzip();
-    figure = figure.trace(Trace::markers("heaviest after each scan", &ex, &ey, Colour::Series(0), "circle", 4.0));
+    figure =
+        figure.trace(Trace::markers("heaviest after each scan", &ex, &ey, Colour::Series(0), "circle", 4.0));
     for (kind, symbol) in SYMBOLS.iter().enumerate() {
-        let of_kind = scenario.landmarks.iter().filter(|(id, _)| {
-            scenario.landmark_kinds.get(id).is_some_and(|own| *own as usize == kind)
-        });
+        let of_kind = scenario
+            .landmarks
+            .iter()
+            .filter(|(id, _)| scenario.landmark_kinds.get(id).is_some_and(|own| *own as usize == kind));
         let (xs, ys): (Vec<f64>, Vec<f64>) = of_kind.map(|(_, [x, y])| (*x, *y)).unzip();
         let name = format!("landmarks of kind {kind}");
         figure = figure.trace(Trace::markers(&name, &xs, &ys, Colour::Ink, symbol, 11.0));
@@ -176,7 +179,8 @@ fn shares(outcome: &Outcome) -> Figure {
         ("carried off, no reserve", outcome.recovered_s(&outcome.without_reserve)),
     ];
     let mut figure = Figure::new(
-        Axis::new("time since the start or the kidnapping", "s").range(0.0, outcome.duration_s - outcome.kidnapped_at_s),
+        Axis::new("time since the start or the kidnapping", "s")
+            .range(0.0, outcome.duration_s - outcome.kidnapped_at_s),
         Axis::new("share of runs", "-").range(0.0, 1.04),
     );
     for (index, (name, times)) in cases.into_iter().enumerate() {

@@ -4,9 +4,7 @@
 use pleiad_estimation::fact::{Absolute, Boot, EntryId, Noise, NominalState, Quantity};
 use pleiad_estimation::geometry::{Matrix3, Vector3, wrap_angle};
 use pleiad_estimation::hypotheses::{Belief, KindOfLandmark, Localizer, Settings, Sighting};
-use pleiad_estimation::reference::{
-    ErrorForm, FactContent, JointEkf, Measurement, ReferenceFact, State,
-};
+use pleiad_estimation::reference::{ErrorForm, FactContent, JointEkf, Measurement, ReferenceFact, State};
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, Pose2, Sequence, Timestamp};
 use pleiad_sim_peers::Scenario;
@@ -30,7 +28,8 @@ pub(super) fn difference(scenario: &Scenario, seed: u64) -> Result<f64, SurveyEr
     // Every landmark is of a kind of its own.
     let mut map = map_of(&scenario);
     map.landmarks.iter_mut().enumerate().for_each(|(index, landmark)| landmark.kind = KindOfLandmark(index));
-    let told = Matrix3::from_diagonal(&Vector3::new(sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad));
+    let told =
+        Matrix3::from_diagonal(&Vector3::new(sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad));
     let settings = Settings { gate: f64::INFINITY, carried_off_hz: 0.0, ..Settings::default() };
     let mut localizer = Localizer::told(map.clone(), settings, &prior.pose, &told, &start);
 
@@ -45,12 +44,14 @@ pub(super) fn difference(scenario: &Scenario, seed: u64) -> Result<f64, SurveyEr
         let sighting = Sighting { time, observer, relative, noise: world.noise, recognition: &recognition };
         localizer.sighted(&sighting).map_err(|error| diverged(&error.to_string()))?;
         let position_m = map.landmarks[index].position_m;
-        let landmark = Quantity::Landmark { landmark: seen, position_m: [position_m.x, position_m.y], relative };
+        let landmark =
+            Quantity::Landmark { landmark: seen, position_m: [position_m.x, position_m.y], relative };
         facts.add(time, landmark, world.noise, observer);
     }
     let oracle = JointEkf { form: ErrorForm::Invariant, gate: [f64::INFINITY; 3] }.fold(&facts.all);
     let (_, end) = world.nominal.end();
-    let (pose, invariant) = oracle.predict(ROBOT, &end).ok_or_else(|| diverged("the oracle lost the robot"))?;
+    let (pose, invariant) =
+        oracle.predict(ROBOT, &end).ok_or_else(|| diverged("the oracle lost the robot"))?;
     let published = pose.additive_from_invariant();
     let covariance = published * invariant * published.transpose();
     let Belief::One(own) = localizer.belief(&end) else {

@@ -142,7 +142,7 @@ mod bound {
     pub const HALF: [f64; 2] = [1.8, 2.2];
     pub const ONE_OF_FOUR: [f64; 2] = [3.6, 4.4];
     /// Largest share of time with the sight that a rule needs, upper end.
-    pub const SIGHT: f64 = 0.95;
+    pub const SIGHT: f64 = 0.98;
     /// Error of the joint filter after a block over that by sight alone, ends of the intervals.
     pub const BLOCKED: f64 = 0.5;
 }
@@ -159,8 +159,8 @@ fn claims(outcome: &Outcome) -> Vec<Claim> {
     let [[half_low, half_high], [one_low, one_high]] = [bound::HALF, bound::ONE_OF_FOUR];
     let alone = outcome.ratio(Case::AllMoving, Case::Independent, task_rmse_m);
     let alone_late = outcome.ratio(Case::AllMoving, Case::Independent, late_rmse_m);
-    let per_metre = [Case::Portable, Case::OneMover]
-        .map(|case| outcome.ratio(Case::AllMoving, case, task_rmse_m));
+    let per_metre =
+        [Case::Portable, Case::OneMover].map(|case| outcome.ratio(Case::AllMoving, case, task_rmse_m));
     let sights = rules.map(|case| outcome.free(case, |run| Some(100.0 * run.in_sight?)));
     let off = rules.map(|case| outcome.blocked(case, |run| run.off_by_sight_m));
     let joint = outcome.blocked(Case::AllMoving, blocked_rmse_m);
@@ -197,7 +197,11 @@ fn claims(outcome: &Outcome) -> Vec<Claim> {
         ),
         claim(
             "When sight is blocked for 30 s, who is located by sight alone is lost, and the joint filter is not",
-            format!("by sight alone off by: {}; joint filter, all moving: {}", named(&off, "m"), words(joint, "m")),
+            format!(
+                "by sight alone off by: {}; joint filter, all moving: {}",
+                named(&off, "m"),
+                words(joint, "m")
+            ),
             off.iter().all(|own| own.is_some_and(|own| joint_high < bound::BLOCKED * own.interval[0])),
         ),
     ]

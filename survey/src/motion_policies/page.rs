@@ -4,7 +4,8 @@ use pleiad_report::{Axis, Colour, Figure, Table, Trace};
 
 use super::team::{Case, Run};
 use super::{
-    BLOCKED_S, Outcome, TASK_M, after_block_rmse_m, blocked_rmse_m, late_rmse_m, task_rmse_m, task_time_s, words,
+    BLOCKED_S, Outcome, TASK_M, after_block_rmse_m, blocked_rmse_m, late_rmse_m, task_rmse_m, task_time_s,
+    words,
 };
 use crate::Shown;
 
@@ -62,7 +63,11 @@ fn tasks(outcome: &Outcome) -> Table {
             words(outcome.free(case, task_time_s), "s"),
             words(outcome.free(case, task_rmse_m), "m"),
             words(outcome.free(case, late_rmse_m), "m"),
-            if case.needs().is_some() { percent(|run| Some(100.0 * run.in_sight?)) } else { "none needed".into() },
+            if case.needs().is_some() {
+                percent(|run| Some(100.0 * run.in_sight?))
+            } else {
+                "none needed".into()
+            },
             percent(|run| Some(100.0 * run.alone)),
         ]);
     }

@@ -133,9 +133,8 @@ pub(super) fn play(
     let options = StrategyOptions { seed, ..StrategyOptions::new(case.strategy()) };
     let outcome = run(&nodes, &samples, &options).map_err(|error| failed(error.into()))?;
 
-    let moves = |robot: &RobotId| {
-        scenario.robots.get(robot).is_some_and(|own| own.motion.policy != Policy::Parked)
-    };
+    let moves =
+        |robot: &RobotId| scenario.robots.get(robot).is_some_and(|own| own.motion.policy != Policy::Parked);
     let first = samples.values().flatten().map(|sample| sample.time).min();
     let origin_s = first.map_or(0.0, Timestamp::seconds);
     let mut distance = Distance::new(&world.tracks);
@@ -191,8 +190,7 @@ impl<'a> Distance<'a> {
 }
 
 fn standing(track: &Track, t_s: f64) -> bool {
-    let [before, after] =
-        [t_s - 0.25, t_s + 0.25].map(|t_s| track.pose_at(Timestamp::from_seconds(t_s)));
+    let [before, after] = [t_s - 0.25, t_s + 0.25].map(|t_s| track.pose_at(Timestamp::from_seconds(t_s)));
     let turned = pleiad_estimation::geometry::wrap_angle(after.yaw_rad() - before.yaw_rad()).abs();
     (after.position() - before.position()).norm() + turned < 0.5 * STANDING_M_S
 }
@@ -209,9 +207,10 @@ fn sight(world: &SimulatedRun, case: Case, reach_m: f64, duration_s: f64) -> (Op
             .map(|(robot, track)| (robot, track.pose_at(at).position(), standing(track, t_s)))
             .collect();
         for (robot, place, stands) in &robots {
-            let near = robots.iter().filter(|(other, there, _)| other != robot && (place - there).norm() <= reach_m);
-            let (beacons, others) =
-                near.fold((0, 0), |(beacons, others), (.., stands)| (beacons + usize::from(*stands), others + 1));
+            let near =
+                robots.iter().filter(|(other, there, _)| other != robot && (place - there).norm() <= reach_m);
+            let (beacons, others) = near
+                .fold((0, 0), |(beacons, others), (.., stands)| (beacons + usize::from(*stands), others + 1));
             all += 1;
             alone += u32::from(others == 0);
             if !stands {
@@ -251,7 +250,8 @@ impl Run {
 
     /// Root mean square of the errors at the looks that pass.
     pub(super) fn rmse_m(&self, passes: impl Fn(&Look) -> bool) -> Option<f64> {
-        let squares: Vec<f64> = self.looks.iter().filter(|look| passes(look)).map(|look| look.square_m2).collect();
+        let squares: Vec<f64> =
+            self.looks.iter().filter(|look| passes(look)).map(|look| look.square_m2).collect();
         (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     }
 }
