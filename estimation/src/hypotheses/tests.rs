@@ -20,7 +20,7 @@ fn map(landmarks: &[MappedLandmark]) -> KindedMap {
     KindedMap { landmarks: landmarks.to_vec(), bounds_m: [-10.0, 10.0, -10.0, 10.0] }
 }
 
-fn sighting<'a>(seconds: f64, range_m: f64, bearing_rad: f64, recognition: &'a [f64]) -> Sighting<'a> {
+fn sighting(seconds: f64, range_m: f64, bearing_rad: f64, recognition: &[f64]) -> Sighting<'_> {
     Sighting {
         time: Timestamp::from_seconds(seconds),
         observer: START,
