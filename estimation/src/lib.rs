@@ -10,6 +10,7 @@
 pub mod fact;
 pub mod fold;
 pub mod geometry;
+pub mod hypotheses;
 pub mod identity;
 pub mod joint;
 pub mod ledger;

@@ -1,12 +1,18 @@
 //! What the agent of a simulated robot has to be told: the geometry that is declared of it, the noises and
 //! the start that its world was made with.
 
-use pleiad_agent::config::{
-    AngleNoise, LengthNoise, MotionSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection,
-};
+use std::collections::BTreeMap;
 
-use crate::Prior;
+use pleiad_agent::config::{
+    AngleNoise, BusSection, ClockSection, FilterSection, LandmarkRow, LedgerSection, LengthNoise,
+    MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection,
+};
+use pleiad_agent::{AgentConfig, ConfigError, NodeConfig};
+use pleiad_estimation::RobotId;
+use pleiad_estimation::strategy::StrategyKind;
+
 use crate::scenario::{RelativeKind, RobotSettings};
+use crate::{Prior, Scenario, SimulatedRun};
 
 /// A robot that is told a limit of zero could never have moved in a gap of its odometry.
 const LEAST_LIMIT: f64 = 0.1;
@@ -68,4 +74,41 @@ pub fn prior(prior: &Prior) -> PriorSection {
         sigma_heading_rad: prior.sigma_heading_rad,
         for_boot: 0,
     }
+}
+
+/// How rarely a node publishes what is not asked for, Hz: runs in one process look at the nodes themselves.
+const PUBLISHED_HZ: f64 = 0.01;
+
+/// A simulated team as nodes in one process take it: told what the scenario tells them, the map included.
+///
+/// # Errors
+/// [`ConfigError`] if a robot's settings do not make a node.
+pub fn nodes(
+    scenario: &Scenario,
+    run: &SimulatedRun,
+    strategy: StrategyKind,
+) -> Result<BTreeMap<RobotId, NodeConfig>, ConfigError> {
+    let rows = run.recording.landmarks.iter();
+    let landmarks: Vec<LandmarkRow> =
+        rows.map(|(id, [x_m, y_m])| LandmarkRow { id: id.0, x_m: *x_m, y_m: *y_m }).collect();
+    let node = |(robot, settings): (&RobotId, &RobotSettings)| {
+        let agent = AgentConfig {
+            team: "pleiad".to_owned(),
+            robot: robot.0,
+            strategy,
+            filter: FilterSection::default(),
+            model: None,
+            prior: run.priors.get(robot).map(prior),
+            motion: motion(settings),
+            sensors: sensors(settings),
+            clock: ClockSection::default(),
+            landmarks: landmarks.clone(),
+            bus: BusSection::default(),
+            ledger: LedgerSection::default(),
+            output: OutputSection::default(),
+            faults: None,
+        };
+        Ok((*robot, NodeConfig { estimate_rate_hz: PUBLISHED_HZ, ..agent.node()? }))
+    };
+    scenario.robots.iter().map(node).collect()
 }

@@ -5,8 +5,10 @@
 //! is simulated or filtered here by means of its own.
 
 mod error;
+pub mod hypotheses;
 pub mod map;
 mod monte_carlo;
+pub mod motion_policies;
 pub mod slam;
 mod study;
 pub mod umbmark;
@@ -27,5 +29,15 @@ pub const STUDIES: &[Known] = &[
         name: "slam",
         about: "EKF SLAM: what a map converges to, what the choice of the error does to it, association, bearings alone",
         run: slam::study,
+    },
+    Known {
+        name: hypotheses::NAME,
+        about: "several hypotheses on a map of look-alike landmarks",
+        run: hypotheses::study,
+    },
+    Known {
+        name: motion_policies::NAME,
+        about: "rules of motion for teams, beside the joint filter",
+        run: motion_policies::study,
     },
 ];

@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
 use super::load::{Document, EFFECTS};
-use super::{Declared, ManoeuvreKind, RobotSettings, Start};
+use super::{Declared, Kidnap, ManoeuvreKind, RobotSettings, Start};
 use crate::Error;
 
 /// Keys whose value is one of a few words, by the end of their path.
@@ -63,6 +63,7 @@ impl Lines {
 pub(super) fn template() -> Result<Table, toml::ser::Error> {
     let mut settings = RobotSettings { start: Some(Start::default()), ..RobotSettings::default() };
     settings.motion.area_m = Some([0.0; 4]);
+    settings.kidnap = vec![Kidnap::default()];
     settings.motion.script = vec![[0.0; 3]];
     settings.motion.manoeuvres = vec![ManoeuvreKind::Standstill];
     settings.gps.windows_s = vec![[0.0; 2]];

@@ -59,6 +59,8 @@ struct Landmark {
     id: u32,
     x_m: f64,
     y_m: f64,
+    #[serde(default)]
+    kind: u32,
 }
 
 /// Seed of a scenario that names none.
@@ -85,7 +87,7 @@ impl Document {
             team_size: 0,
             random_landmarks: 0,
             walls_m: vec![[0.0; 4]],
-            landmarks: vec![Landmark { id: 0, x_m: 0.0, y_m: 0.0 }],
+            landmarks: vec![Landmark { id: 0, x_m: 0.0, y_m: 0.0, kind: 0 }],
             defaults,
             robots: vec![robot],
             fault: Vec::new(),
@@ -146,8 +148,10 @@ impl Loader<'_> {
             robots.insert(id, self.settings(&document.defaults, Some((&own, &path)))?);
         }
         let mut landmarks = BTreeMap::new();
+        let mut landmark_kinds = BTreeMap::new();
         for (index, landmark) in document.landmarks.iter().enumerate() {
             let position = [landmark.x_m, landmark.y_m];
+            landmark_kinds.insert(LandmarkId(landmark.id), landmark.kind);
             if landmarks.insert(LandmarkId(landmark.id), position).is_some() {
                 let path = format!("landmarks[{index}].id");
                 let found = format!("{} again", landmark.id);
@@ -164,6 +168,7 @@ impl Loader<'_> {
             truth_sigma_rad: document.truth_sigma_rad,
             walls_m: document.walls_m,
             landmarks,
+            landmark_kinds,
             random_landmarks: document.random_landmarks,
             robots,
             faults,

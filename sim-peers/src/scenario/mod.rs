@@ -19,7 +19,7 @@ pub use declared::Declared;
 pub use drive::{DriveKind, DriveSettings};
 pub use manoeuvre::{ManoeuvreKind, UnknownManoeuvre};
 pub use settings::{
-    Direction, Gps, Gyro, Heading, LastingSlip, Motion, MotionNoise, Odometry, OdometryKind, Policy,
+    Direction, Gps, Gyro, Heading, Kidnap, LastingSlip, Motion, MotionNoise, Odometry, OdometryKind, Policy,
     PriorSettings, RangeScan, RelativeKind, RelativeSensor, RobotSettings, See, Start,
 };
 
@@ -44,6 +44,8 @@ pub struct Scenario {
     pub landmarks: BTreeMap<LandmarkId, [f64; 2]>,
     /// Walls that range scans meet: segments `[x0, y0, x1, y1]`, metres. They do not stop robots.
     pub walls_m: Vec<[f64; 4]>,
+    /// What given landmarks look like: those of one kind look alike. It is in no recording, which names landmarks.
+    pub landmark_kinds: BTreeMap<LandmarkId, u32>,
     /// Further landmarks at random places, numbered on from the largest given one.
     pub random_landmarks: u32,
     /// The team.

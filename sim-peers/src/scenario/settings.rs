@@ -41,6 +41,8 @@ pub struct RobotSettings {
     pub prior: PriorSettings,
     /// How it moves.
     pub motion: Motion,
+    /// When it is carried off, and whereto; its odometry does not notice.
+    pub kidnap: Vec<Kidnap>,
     /// Its odometry.
     pub odometry: Odometry,
     /// Its gyro.
@@ -75,6 +77,7 @@ impl Default for RobotSettings {
             effects: Vec::new(),
             prior: PriorSettings::default(),
             motion: Motion::default(),
+            kidnap: Vec::new(),
             odometry: Odometry::default(),
             gyro: Gyro::default(),
             gps: Gps::default(),
@@ -95,6 +98,20 @@ pub struct Start {
     /// Position along y, metres.
     pub y_m: f64,
     /// Heading, radians.
+    pub heading_rad: f64,
+}
+
+/// A robot is carried off: between two ticks of its odometry it comes to be elsewhere, and its wheels do not turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Kidnap {
+    /// When, seconds; it takes place at the first tick of the odometry from there on.
+    pub time_s: f64,
+    /// Whereto: position along x, metres.
+    pub x_m: f64,
+    /// Whereto: position along y, metres.
+    pub y_m: f64,
+    /// Whereto: heading, radians.
     pub heading_rad: f64,
 }
 

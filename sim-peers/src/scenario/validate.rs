@@ -116,6 +116,17 @@ impl Check {
             self.between("start.y_m", start.y_m, y_min, y_max)?;
             self.finite("start.heading_rad", start.heading_rad)?;
         }
+        let mut last_s = 0.0;
+        for kidnap in &settings.kidnap {
+            if !(kidnap.time_s.is_finite() && kidnap.time_s > last_s) {
+                let expected = format!("a time after {last_s}: above 0, and one later than the other");
+                return Err(self.invalid("kidnap.time_s", &kidnap.time_s.to_string(), &expected));
+            }
+            last_s = kidnap.time_s;
+            self.between("kidnap.x_m", kidnap.x_m, x_min, x_max)?;
+            self.between("kidnap.y_m", kidnap.y_m, y_min, y_max)?;
+            self.finite("kidnap.heading_rad", kidnap.heading_rad)?;
+        }
         if let Some(area) = settings.motion.area_m {
             let [left, right, bottom, top] = area;
             let inside = x_min <= left && left < right && right <= x_max;

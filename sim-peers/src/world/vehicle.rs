@@ -58,6 +58,8 @@ pub(super) struct Vehicle<'a> {
     /// Time of the first tick, seconds.
     first_s: f64,
     ticks: u32,
+    /// How often it has been carried off.
+    carried_off: usize,
     /// Time of the first command, seconds.
     first_command_s: f64,
     commands: Vec<Command>,
@@ -98,6 +100,7 @@ impl<'a> Vehicle<'a> {
             jitter: seed.stream(robot, Channel::Jitter),
             first_s,
             ticks: 0,
+            carried_off: 0,
             first_command_s: first_s + seed.phase(robot, Channel::Commands) / settings.command_rate_hz,
             commands: Vec::new(),
             scheduled: Vec::new(),
@@ -136,6 +139,7 @@ impl<'a> Vehicle<'a> {
     /// Drives from one sample of the odometry to the next.
     pub(super) fn tick(&mut self, team: &[Neighbour]) {
         let begun = self.now();
+        self.be_carried_off(begun.seconds());
         self.ticks += 1;
         let until =
             Timestamp::from_seconds(self.first_s + f64::from(self.ticks) / self.settings.odometry.rate_hz);
@@ -156,6 +160,16 @@ impl<'a> Vehicle<'a> {
         self.motion.pose = self.track.last();
         self.wheel_angles.push(self.motion.wheel_angle_rad);
         self.steer_rad.push(self.steering.angle_rad());
+    }
+
+    /// Puts the robot where it was carried to by now: its wheels do not turn, and its speed stays.
+    fn be_carried_off(&mut self, now_s: f64) {
+        while let Some(kidnap) =
+            self.settings.kidnap.get(self.carried_off).filter(|kidnap| kidnap.time_s <= now_s)
+        {
+            self.motion.pose = Pose::new(kidnap.x_m, kidnap.y_m, kidnap.heading_rad);
+            self.carried_off += 1;
+        }
     }
 
     /// Takes the commands that are given before `until`, by what the operator sees now.

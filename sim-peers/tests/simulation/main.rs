@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests are tests")]
 
 mod channels;
+mod kidnap;
 mod manoeuvres;
 mod motion;
 mod scenario_errors;
