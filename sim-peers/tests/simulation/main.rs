@@ -5,6 +5,7 @@
 mod channels;
 mod manoeuvres;
 mod motion;
+mod readings;
 mod scenario_errors;
 mod shipped;
 mod sightings;
