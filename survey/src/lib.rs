@@ -23,6 +23,10 @@ pub use study::{Claim, Known, Shown, Study, StudyOptions};
 pub const STUDIES: &[Known] = &[
     Known { name: "kalman", about: "the filter itself: steady states, consistency", run: kalman::run },
     Known { name: "gyro", about: "wheels and a gyro; what correlated noise is worth", run: gyro::run },
-    Known { name: "rover", about: "encoders, rear steering, gyro, and a slow or late sun sensor", run: rover::run },
+    Known {
+        name: "rover",
+        about: "encoders, rear steering, gyro, and a slow or late sun sensor",
+        run: rover::run,
+    },
     Known { name: "skid-steer", about: "raw and calibrated odometry, gyro and GPS", run: skid_steer::run },
 ];

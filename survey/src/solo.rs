@@ -9,6 +9,7 @@ use pleiad_recording::RobotRecording;
 use pleiad_sim_peers::{Prior, Scenario, SimulatedRun, simulate};
 
 use crate::error::SurveyError;
+use crate::monte_carlo::Estimate;
 use crate::study::StudyOptions;
 
 /// The robot of these studies.
@@ -159,6 +160,24 @@ pub(crate) fn seeds(
     Ok((options.first_seed..).take(found).collect())
 }
 
+/// How many times the first root mean square is the second, with its 95 % interval, from squared errors of the same
+/// runs: the delta method on the logarithm of the ratio, Student's t. `None` for fewer than two runs.
+pub(crate) fn times(first: &[f64], second: &[f64]) -> Option<(f64, [f64; 2])> {
+    let mean = |own: &[f64]| own.iter().sum::<f64>() / own.len() as f64;
+    let (a, b) = (mean(first), mean(second));
+    let shares: Vec<f64> = first.iter().zip(second).map(|(x, y)| x / a - y / b).collect();
+    let spread = Estimate::of(&shares)?;
+    let half = 0.25 * (spread.interval[1] - spread.interval[0]);
+    let ratio = (a / b).sqrt();
+    Some((ratio, [ratio * (-half).exp(), ratio * half.exp()]))
+}
+
+/// In words: `2.7 (1.9..3.8) times`.
+pub(crate) fn times_words((ratio, [low, high]): (f64, [f64; 2])) -> String {
+    let decimals = if ratio < 10.0 { 2 } else { 1 };
+    format!("{ratio:.decimals$} ({low:.decimals$}..{high:.decimals$}) times")
+}
+
 /// The root of a mean square.
 pub(crate) fn root_mean_square(values: impl IntoIterator<Item = f64>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
@@ -167,4 +186,34 @@ pub(crate) fn root_mean_square(values: impl IntoIterator<Item = f64>) -> f64 {
         count += 1.0;
     }
     (sum / count).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_chacha::ChaCha12Rng;
+    use rand_chacha::rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    #[test]
+    fn the_interval_of_a_ratio_holds_the_true_one_as_often_as_it_says() {
+        // Squares of normals of standard deviations 2 and 1, which share half of their variance: 95 % of 400
+        // intervals, give or take three standard deviations of a count (13).
+        let mut random = ChaCha12Rng::seed_from_u64(5);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut held = 0;
+        for _ in 0..400 {
+            let (mut first, mut second) = (Vec::new(), Vec::new());
+            for _ in 0..100 {
+                let shared = normal();
+                let mut own = || (0.5_f64.sqrt() * (shared + normal())).powi(2);
+                first.push(4.0 * own());
+                second.push(own());
+            }
+            let (_, [low, high]) = times(&first, &second).unwrap();
+            held += usize::from(low < 2.0 && 2.0 < high);
+        }
+        assert!((380 - 20..=393).contains(&held), "{held} of 400");
+    }
 }

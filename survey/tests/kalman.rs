@@ -1,7 +1,7 @@
 //! The Kalman filter's claims, with fewer draws than the command takes.
 
-use pleiad_survey::kalman::{self, System, Told, consistency};
 use pleiad_survey::StudyOptions;
+use pleiad_survey::kalman::{self, System, Told, consistency};
 
 #[test]
 fn every_claim_holds_and_the_steady_state_is_exact() {

@@ -5,7 +5,7 @@ use pleiad_survey::rover;
 
 #[test]
 fn dead_reckoning_is_worse_than_the_filter_and_the_filter_than_the_filter_with_sun() {
-    let study = rover::run(&StudyOptions { seeds: Some(24), first_seed: 4000 }).unwrap();
+    let study = rover::run(&StudyOptions { seeds: Some(48), first_seed: 4000 }).unwrap();
     for claim in study.claims.iter().filter(|claim| !claim.statement.contains("within a fifth")) {
         assert!(claim.holds, "{claim:?}");
     }

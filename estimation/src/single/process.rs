@@ -36,6 +36,8 @@ pub struct RandomWalks {
     pub speed_m_s: f64,
     /// Yaw rate, rad/s.
     pub yaw_rate_rad_s: f64,
+    /// What the gyro reads at standstill, where a process has it, rad/s.
+    pub gyro_bias_rad_s: f64,
 }
 
 /// A unicycle: `x, y, heading, speed V, yaw rate w`; `V` and `w` are random walks.
@@ -49,7 +51,8 @@ pub struct Unicycle {
 }
 
 /// A robot whose two sides turn without telling how it turns (skid steering): `x, y, heading`, the speeds of its left
-/// and right wheels, and the yaw rate, which does not follow from them; the last three are random walks.
+/// and right wheels, the yaw rate, which does not follow from them, and the bias of the gyro that reads it; the last four
+/// are random walks. Only an absolute measurement tells the yaw rate from the bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairOfWheels {
     /// Process noise.
@@ -87,6 +90,8 @@ impl PairOfWheels {
     pub const RIGHT: usize = 4;
     /// Yaw rate, rad/s.
     pub const YAW_RATE: usize = 5;
+    /// What the gyro reads at standstill, rad/s.
+    pub const GYRO_BIAS: usize = 6;
 }
 
 impl Process<5> for Unicycle {
@@ -103,17 +108,20 @@ impl Process<5> for Unicycle {
     }
 }
 
-impl Process<6> for PairOfWheels {
-    fn names(&self) -> [&'static str; 6] {
-        ["x_m", "y_m", "heading_rad", "left_m_s", "right_m_s", "yaw_rate_rad_s"]
+impl Process<7> for PairOfWheels {
+    fn names(&self) -> [&'static str; 7] {
+        ["x_m", "y_m", "heading_rad", "left_m_s", "right_m_s", "yaw_rate_rad_s", "gyro_bias_rad_s"]
     }
 
     fn heading(&self) -> usize {
         HEADING
     }
 
-    fn predict(&self, state: &SVector<f64, 6>, seconds: f64) -> Prediction<6> {
-        driven(state, &[(Self::LEFT, 0.5), (Self::RIGHT, 0.5)], Self::YAW_RATE, seconds, &self.walks)
+    fn predict(&self, state: &SVector<f64, 7>, seconds: f64) -> Prediction<7> {
+        let sides = [(Self::LEFT, 0.5), (Self::RIGHT, 0.5)];
+        let mut prediction = driven(state, &sides, Self::YAW_RATE, seconds, &self.walks);
+        prediction.noise[(Self::GYRO_BIAS, Self::GYRO_BIAS)] = self.walks.gyro_bias_rad_s.powi(2) * seconds;
+        prediction
     }
 }
 

@@ -3,8 +3,13 @@ use nalgebra::{Matrix2, SMatrix, SVector};
 use super::*;
 use crate::linear::Gaussian;
 
-const WALKS: RandomWalks =
-    RandomWalks { position_m: 0.01, heading_rad: 0.02, speed_m_s: 0.3, yaw_rate_rad_s: 0.4 };
+const WALKS: RandomWalks = RandomWalks {
+    position_m: 0.01,
+    heading_rad: 0.02,
+    speed_m_s: 0.3,
+    yaw_rate_rad_s: 0.4,
+    gyro_bias_rad_s: 0.1,
+};
 /// Central differences with this step are exact to about its square, and to rounding over it.
 const STEP: f64 = 1e-5;
 const WITHIN: f64 = 1e-9;
@@ -40,7 +45,7 @@ fn check_process<const N: usize>(process: &impl Process<N>, state: SVector<f64, 
 fn transitions_match_central_differences() {
     for (speed, rate) in [(0.5, 0.3), (-0.4, 1.2), (0.0, -0.7)] {
         check_process(&Unicycle { walks: WALKS }, SVector::from([1.0, -2.0, 0.6, speed, rate]));
-        let own = SVector::from([1.0, -2.0, 0.6, speed - 0.1, speed + 0.3, rate]);
+        let own = SVector::from([1.0, -2.0, 0.6, speed - 0.1, speed + 0.3, rate, 0.02]);
         check_process(&PairOfWheels { walks: WALKS }, own);
     }
 }

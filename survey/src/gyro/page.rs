@@ -2,21 +2,20 @@
 
 use pleiad_estimation::Timestamp;
 use pleiad_estimation::single::Unicycle;
-use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace, quantity, with_interval};
+use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace, quantity};
 use serde_json::json;
 
 use super::run::{JUDGED_S, Judged, Variant, begun, judged, measurements, recorded};
 use super::{NAME, Wheels};
 use crate::error::SurveyError;
-use crate::monte_carlo::Estimate;
 use crate::pages::{blank, claim, figure, number, table};
-use crate::solo::{ROBOT, beliefs_at, error_of, pose_of};
+use crate::solo::{ROBOT, beliefs_at, error_of, pose_of, times, times_words};
 use crate::study::Study;
 
 const LEAD: &str = "One robot, two encoders and a gyro in one extended Kalman filter whose speed and yaw rate are random walks. \
 The right encoder is three times worse than the left one, so that the noises of speed and yaw rate are correlated by 0.8: the \
 filter takes each wheel as a measurement of its own, or, in the variants that ignore it, speed and yaw rate as if they were \
-independent. The robot drives what the filter takes it for: random walks about a circle.";
+independent. The robot drives what the filter takes it for: random walks about a circle, clockwise.";
 
 pub(super) fn study(seeds: &[u64]) -> Result<Study, SurveyError> {
     let mut page = blank(NAME, "Wheels and a gyro", LEAD);
@@ -46,13 +45,6 @@ fn root(squares: &[f64]) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// Mean of the paired differences `worse - better` relative to the mean of `worse`, in percent.
-fn gain_percent(worse: &[f64], better: &[f64]) -> Option<Estimate> {
-    let mean = worse.iter().sum::<f64>() / worse.len() as f64;
-    let differences: Vec<f64> = worse.iter().zip(better).map(|(a, b)| 100.0 * (a - b) / mean).collect();
-    Estimate::of(&differences)
-}
-
 fn of(all: &[Judged], wheels: Wheels, gyro: bool) -> Option<&Judged> {
     all.iter().find(|own| own.variant == Variant { wheels, gyro })
 }
@@ -73,7 +65,8 @@ fn claims(page: &mut Study, all: &[Judged]) {
         words.join(", ")
     };
     let interval = wheels.nees.times.first().map_or((f64::NAN, f64::NAN), |time| time.interval);
-    let within = format!("99 % of consistent filters within {:.2}..{:.2} at all five times", interval.0, interval.1);
+    let within =
+        format!("99 % of consistent filters within {:.2}..{:.2} at all five times", interval.0, interval.1);
     claim(
         page,
         "With the correlation the filter is as good as it says, with the gyro and without",
@@ -87,34 +80,34 @@ fn claims(page: &mut Study, all: &[Judged]) {
         !ignored.nees.is_consistent(),
     );
     let mut compared = |statement: &str, name: &str, worse: &[f64], better: &[f64], unit: &str| {
-        let Some(gain) = gain_percent(worse, better) else { return };
+        let Some(ratio) = times(worse, better) else { return };
         let measured = format!(
-            "{} instead of {} (RMS at the end); mean square lower by {}",
+            "{} instead of {} (RMS at the end): {} smaller",
             quantity(root(better), unit),
             quantity(root(worse), unit),
-            with_interval(gain.mean, gain.interval, "%"),
+            times_words(ratio),
         );
-        number(page, &format!("{name}_percent"), gain.mean);
-        number(page, &format!("{name}_percent_interval"), json!(gain.interval));
-        claim(page, statement, measured, gain.interval[0] > 0.0);
+        number(page, name, ratio.0);
+        number(page, &format!("{name}_interval"), json!(ratio.1));
+        claim(page, statement, measured, ratio.1[0] > 1.0);
     };
     compared(
         "With a gyro, ignoring the correlation costs position",
-        "correlation_lowers_squared_position_error",
+        "position_error_times_without_correlation",
         &both_ignored.position_m2,
         &both.position_m2,
         "m",
     );
     compared(
         "The gyro makes the heading better",
-        "gyro_lowers_squared_heading_error",
+        "heading_error_times_without_gyro",
         &wheels.heading_rad2,
         &both.heading_rad2,
         "rad",
     );
     compared(
         "The gyro makes the position better",
-        "gyro_lowers_squared_position_error",
+        "position_error_times_without_gyro",
         &wheels.position_m2,
         &both.position_m2,
         "m",
@@ -123,7 +116,8 @@ fn claims(page: &mut Study, all: &[Judged]) {
 
 fn summary(all: &[Judged], runs: usize) -> Table {
     let header = ["filter", "position error, RMS", "heading error, RMS", "NEES per dimension", "consistent"];
-    let caption = format!("Errors after 30 s over {runs} runs, and the mean NEES of the five times of judgement.");
+    let caption =
+        format!("Errors after 30 s over {runs} runs, and the mean NEES of the five times of judgement.");
     all.iter().fold(Table::new(caption, header), |rows, own| {
         let consistent = if own.nees.is_consistent() { "yes" } else { "no" };
         rows.row([
@@ -162,8 +156,8 @@ fn one_run(page: &mut Study, seed: u64) -> Result<(), SurveyError> {
     let failed = |what: String| SurveyError::Diverged { study: NAME, seed, what };
     let track = &run.tracks[&ROBOT];
     let seconds: Vec<f64> = (10..=310).map(|k| f64::from(k) * 0.1).collect();
-    let times: Vec<Timestamp> = seconds.iter().map(|own| Timestamp::from_seconds(*own)).collect();
-    let truth: Vec<_> = times.iter().map(|time| track.pose_at(*time)).collect();
+    let instants: Vec<Timestamp> = seconds.iter().map(|own| Timestamp::from_seconds(*own)).collect();
+    let truth: Vec<_> = instants.iter().map(|time| track.pose_at(*time)).collect();
     let mut map = Figure::new(Axis::new("east", "m"), Axis::new("north", "m")).equal_aspect();
     map = map.trace(Trace::path(
         "truth",
@@ -176,7 +170,7 @@ fn one_run(page: &mut Study, seed: u64) -> Result<(), SurveyError> {
     for (row, gyro) in [false, true].into_iter().enumerate() {
         let variant = Variant { wheels: Wheels::Each, gyro };
         let mut filter = begun(&run).ok_or_else(|| failed("the robot is not told its start".to_owned()))?;
-        let beliefs = beliefs_at(&mut filter, &measurements(&scenario, &run, variant), &times, failed)?;
+        let beliefs = beliefs_at(&mut filter, &measurements(&scenario, &run, variant), &instants, failed)?;
         let colour = Colour::Series(2 * row);
         let column = |state: usize| beliefs.iter().map(|own| own.mean[state]).collect::<Vec<f64>>();
         let path = Trace::path(variant.words(), &column(Unicycle::X), &column(Unicycle::Y), colour);
@@ -190,7 +184,11 @@ fn one_run(page: &mut Study, seed: u64) -> Result<(), SurveyError> {
             .trace(Trace::band("two sigma", &seconds, &bound(-1.0), &bound(1.0), colour).in_row(row))
             .trace(Trace::line(variant.words(), &seconds, &errors, colour).in_row(row));
     }
-    figure(page, headings.height(480), "Heading error of one run within the band of two standard deviations.");
+    figure(
+        page,
+        headings.height(480),
+        "Heading error of one run within the band of two standard deviations.",
+    );
     figure(page, map, "The path of the same run.");
     Ok(())
 }

@@ -81,11 +81,7 @@ pub struct Run<const N: usize> {
 ///
 /// # Errors
 /// [`SurveyError::Diverged`] if the filter refuses a measurement.
-pub fn one_run<const N: usize>(
-    system: &System<N>,
-    told: Told,
-    seed: u64,
-) -> Result<Run<N>, SurveyError> {
+pub fn one_run<const N: usize>(system: &System<N>, told: Told, seed: u64) -> Result<Run<N>, SurveyError> {
     let mut random = ChaCha12Rng::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let System { transition, push, variance, prior } = *system;
@@ -93,8 +89,7 @@ pub fn one_run<const N: usize>(
     let noise = push * push.transpose() * told.process;
     let mut observation = SMatrix::<f64, 1, N>::zeros();
     observation[0] = 1.0;
-    let mut belief =
-        Gaussian::new(SVector::zeros(), SMatrix::from_diagonal(&prior.component_mul(&prior)));
+    let mut belief = Gaussian::new(SVector::zeros(), SMatrix::from_diagonal(&prior.component_mul(&prior)));
     let mut run = Run { truth: Vec::new(), measured: Vec::new(), beliefs: Vec::new(), nis: Vec::new() };
     for _ in 0..STEPS {
         state = transition * state + push * normal();
@@ -141,7 +136,10 @@ pub fn consistency<const N: usize>(
         let at = |k: usize| {
             let error = run.truth[k] - run.beliefs[k].mean;
             let covariance = run.beliefs[k].covariance;
-            (DVector::from_column_slice(error.as_slice()), DMatrix::from_column_slice(N, N, covariance.as_slice()))
+            (
+                DVector::from_column_slice(error.as_slice()),
+                DMatrix::from_column_slice(N, N, covariance.as_slice()),
+            )
         };
         (JUDGED_EVERY - 1..STEPS).step_by(JUDGED_EVERY).map(at).collect()
     };

@@ -9,7 +9,7 @@ use crate::study::{Study, StudyOptions};
 
 pub use consistency::{Consistency, System, Told, consistency, one_run};
 pub use steady::{
-    AlphaBeta, Settled, ScalarWalk, kalata, settle_constant_velocity, settle_walk, vanishing_noise,
+    AlphaBeta, ScalarWalk, Settled, kalata, settle_constant_velocity, settle_walk, vanishing_noise,
 };
 
 pub(crate) const NAME: &str = "kalman";

@@ -3,11 +3,11 @@
 use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace, quantity, with_interval};
 use serde_json::json;
 
+use super::NAME;
 use super::consistency::{Consistency, System, Told, consistency, one_run};
 use super::steady::{
     AlphaBeta, ScalarWalk, Settled, kalata, settle_constant_velocity, settle_walk, vanishing_noise,
 };
-use super::NAME;
 use crate::error::SurveyError;
 use crate::pages::{blank, claim, figure, number, table};
 use crate::study::Study;
@@ -54,7 +54,8 @@ fn scalar(page: &mut Study) -> Result<(), SurveyError> {
             if (r - 1.0).abs() < f64::EPSILON {
                 let form = format!("{:.6e}", walk.steady_variance());
                 let row = [format!("{ratio}"), format!("{:.6e}", settled.variance), form];
-                rows = rows.row(row.into_iter().chain([quantity(settled.gain, ""), settled.steps.to_string()]));
+                rows =
+                    rows.row(row.into_iter().chain([quantity(settled.gain, ""), settled.steps.to_string()]));
                 drawn.push((ratio, settled, walk));
             }
         }
@@ -74,12 +75,24 @@ fn scalar(page: &mut Study) -> Result<(), SurveyError> {
         Axis::new("gain in the steady state", "-").logarithmic(),
     )
     .trace(Trace::line("closed form", &ratios, &column(|d| d.2.steady_gain()), Colour::Muted))
-    .trace(Trace::line("sqrt(Q/R)", &ratios, &ratios.iter().map(|q| q.sqrt()).collect::<Vec<_>>(), Colour::Muted).dash(Dash::Dot))
+    .trace(
+        Trace::line(
+            "sqrt(Q/R)",
+            &ratios,
+            &ratios.iter().map(|q| q.sqrt()).collect::<Vec<_>>(),
+            Colour::Muted,
+        )
+        .dash(Dash::Dot),
+    )
     .trace(Trace::markers("filter", &ratios, &gains, Colour::Series(0), "circle", 8.0))
     .height(340);
     table(page, rows);
-    figure(page, drawing, "Gain of the scalar filter in the steady state. It vanishes with Q, as the root of Q/R, and comes near one where the \
-         state wanders more than is measured wrongly.");
+    figure(
+        page,
+        drawing,
+        "Gain of the scalar filter in the steady state. It vanishes with Q, as the root of Q/R, and comes near one where the \
+         state wanders more than is measured wrongly.",
+    );
     Ok(())
 }
 
@@ -123,9 +136,12 @@ fn alpha_beta(page: &mut Study) -> Result<(), SurveyError> {
             worst = all.map(|(a, b)| (a / b - 1.0).abs()).fold(worst, f64::max);
             if period_s < 1.0 {
                 let cells = [index, own.alpha, form.alpha, own.beta, form.beta];
-                rows = rows.row(cells.iter().enumerate().map(|(k, value)| {
-                    if k == 0 { value.to_string() } else { format!("{value:.9}") }
-                }));
+                rows = rows.row(
+                    cells
+                        .iter()
+                        .enumerate()
+                        .map(|(k, value)| if k == 0 { value.to_string() } else { format!("{value:.9}") }),
+                );
                 found.push(own);
             }
         }
@@ -138,7 +154,8 @@ fn alpha_beta(page: &mut Study) -> Result<(), SurveyError> {
     );
     number(page, "alpha_beta_largest_relative_difference", worst);
     let fine: Vec<f64> = (-200..=100).map(|k| 10_f64.powf(f64::from(k) / 100.0)).collect();
-    let form = |pick: fn(AlphaBeta) -> f64| fine.iter().map(|index| pick(kalata(*index))).collect::<Vec<f64>>();
+    let form =
+        |pick: fn(AlphaBeta) -> f64| fine.iter().map(|index| pick(kalata(*index))).collect::<Vec<f64>>();
     let own = |pick: fn(&AlphaBeta) -> f64| found.iter().map(pick).collect::<Vec<f64>>();
     let drawing = Figure::new(
         Axis::new("tracking index", "-").logarithmic(),
@@ -199,14 +216,21 @@ fn consistent(page: &mut Study, seeds: &[u64]) -> Result<(), SurveyError> {
     claim(
         page,
         "A filter that is told wrong noises is found out",
-        format!("both systems, both wrong noises: {}", if told_apart { "all four found" } else { "not all found" }),
+        format!(
+            "both systems, both wrong noises: {}",
+            if told_apart { "all four found" } else { "not all found" }
+        ),
         told_apart,
     );
     number(page, "runs", seeds.len());
     table(page, rows);
     if let Some(seed) = seeds.first() {
-        figure(page, one_walk(*seed)?, "One draw of the random walk: the estimate with the band of two standard deviations, which narrows to the steady \
-             state within ten measurements.");
+        figure(
+            page,
+            one_walk(*seed)?,
+            "One draw of the random walk: the estimate with the band of two standard deviations, which narrows to the steady \
+             state within ten measurements.",
+        );
     }
     Ok(())
 }
@@ -220,8 +244,8 @@ fn around(own: &Consistency) -> [f64; 2] {
 fn cells(system: &str, words: &str, own: &Consistency) -> [String; 6] {
     let distance = |anees: Option<f64>| anees.map_or(f64::INFINITY, |anees| (anees - 1.0).abs());
     let farthest = own.nees.times.iter().max_by(|a, b| distance(a.anees).total_cmp(&distance(b.anees)));
-    let (anees, interval) =
-        farthest.map_or((f64::NAN, (f64::NAN, f64::NAN)), |time| (time.anees.unwrap_or(f64::NAN), time.interval));
+    let (anees, interval) = farthest
+        .map_or((f64::NAN, (f64::NAN, f64::NAN)), |time| (time.anees.unwrap_or(f64::NAN), time.interval));
     let between = |(low, high): (f64, f64)| format!("{low:.3}..{high:.3}");
     [
         system.to_owned(),

@@ -97,7 +97,7 @@ pub struct AlphaBeta {
     pub posterior: [f64; 3],
 }
 
-/// Kalata's closed form by the tracking index `sigma_a T^2 / sigma_r` (Kalata 1984; `barshalom2001`, section 6.5).
+/// Kalata's closed form by the tracking index `sigma_a T^2 / sigma_r` (`kalata1984`; `barshalom2001`, section 6.5).
 pub fn kalata(index: f64) -> AlphaBeta {
     let root = ((8.0 + index) * index).sqrt();
     let r = (4.0 + index - root) / 4.0;

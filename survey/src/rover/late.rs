@@ -1,8 +1,8 @@
 //! Sun readings that arrive late: to their own instant, or, as a fault, applied when they arrive.
 
+use pleiad_estimation::Timestamp;
 use pleiad_estimation::geometry::wrap_angle;
 use pleiad_estimation::single::{Measurement, Replay, Unicycle};
-use pleiad_estimation::Timestamp;
 use rand_chacha::ChaCha12Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardUniform};
@@ -84,11 +84,7 @@ struct Arrival {
 }
 
 /// Everything in the order in which it arrives: the sun readings late, the rest at once.
-fn arrivals(
-    channels: Vec<Vec<Measurement<5>>>,
-    from: Timestamp,
-    random: &mut ChaCha12Rng,
-) -> Vec<Arrival> {
+fn arrivals(channels: Vec<Vec<Measurement<5>>>, from: Timestamp, random: &mut ChaCha12Rng) -> Vec<Arrival> {
     let mut all = Vec::new();
     for (rank, channel) in (0_u32..).zip(channels) {
         for measurement in channel.into_iter().filter(|own| own.time >= from) {

@@ -10,7 +10,9 @@ use pleiad_sim_peers::{Scenario, SimulatedRun};
 
 use super::NAME;
 use crate::error::SurveyError;
-use crate::solo::{ROBOT, beliefs_at, error_of, in_order, pose_of, readings, rolled, scenario, simulated, told, values};
+use crate::solo::{
+    ROBOT, beliefs_at, error_of, in_order, pose_of, readings, rolled, scenario, simulated, told, values,
+};
 
 const SCENARIO: &str = include_str!("../../../scenarios/rover.toml");
 /// When the filter begins: the rover is up to speed.
@@ -90,6 +92,7 @@ fn walks(settings: &RobotSettings) -> RandomWalks {
         heading_rad: 0.0,
         speed_m_s: 0.02,
         yaw_rate_rad_s: 0.03,
+        gyro_bias_rad_s: 0.0,
     }
 }
 
@@ -108,8 +111,7 @@ pub(super) fn channels(scenario: &Scenario, run: &SimulatedRun, method: Method) 
             variance: spread_m * spread_m / tick.seconds,
         })
         .collect();
-    let gyro =
-        readings(&values(&recorded.gyro), Sensor::of(Unicycle::YAW_RATE), settings.gyro.sigma_rad_s);
+    let gyro = readings(&values(&recorded.gyro), Sensor::of(Unicycle::YAW_RATE), settings.gyro.sigma_rad_s);
     let heading = values(&recorded.heading).into_iter();
     let sun: Vec<_> = match method {
         Method::FastSun => heading.collect(),
@@ -136,10 +138,7 @@ fn steering(settings: &RobotSettings, steer: &[SteerSample]) -> Vec<Measurement<
 }
 
 /// The filter as it begins.
-pub(super) fn begun(
-    settings: &RobotSettings,
-    run: &SimulatedRun,
-) -> Option<Ekf<Unicycle, 5>> {
+pub(super) fn begun(settings: &RobotSettings, run: &SimulatedRun) -> Option<Ekf<Unicycle, 5>> {
     let from = Timestamp::from_seconds(FROM_S);
     let prior = told(run, from)?;
     let belief = Gaussian::from_sigmas(

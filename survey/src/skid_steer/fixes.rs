@@ -66,7 +66,7 @@ pub fn laps(seed: u64, calibrated: &Effective) -> Result<Laps, SurveyError> {
     let times = every_second(&run);
     let without = filtered(&scenario, &run, calibrated, Fixes::Ignored, &times)?;
     let with = filtered(&scenario, &run, calibrated, Fixes::Taken(1.0), &times)?;
-    let errors = |beliefs: &[pleiad_estimation::linear::Gaussian<6>]| -> Vec<f64> {
+    let errors = |beliefs: &[pleiad_estimation::linear::Gaussian<7>]| -> Vec<f64> {
         beliefs.iter().zip(&times).map(|(own, time)| squared(&run, &pose_of(own), *time)).collect()
     };
     Ok(Laps {

@@ -16,8 +16,13 @@ use crate::solo::{ROBOT, beliefs_at, error_of, in_order, pose_of, readings, roll
 
 /// What the filter is told of the wander of its states, per root of a second: speeds that step at every command, and
 /// a heading and a position that wander by what gyro and skid leave out.
-const WALKS: RandomWalks =
-    RandomWalks { position_m: 0.01, heading_rad: 0.004, speed_m_s: 0.3, yaw_rate_rad_s: 0.5 };
+const WALKS: RandomWalks = RandomWalks {
+    position_m: 0.01,
+    heading_rad: 0.004,
+    speed_m_s: 0.3,
+    yaw_rate_rad_s: 0.5,
+    gyro_bias_rad_s: 0.0002,
+};
 
 /// How the robot is localized.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,20 +147,18 @@ pub(super) fn filtered(
     calibrated: &Effective,
     fixes: Fixes,
     times: &[Timestamp],
-) -> Result<Vec<Gaussian<6>>, SurveyError> {
+) -> Result<Vec<Gaussian<7>>, SurveyError> {
     let (settings, recorded) = (&scenario.robots[&ROBOT], &run.recording.robots[&ROBOT]);
     let prior = run.priors.get(&ROBOT).ok_or_else(|| untold(run))?;
     let from = Timestamp::from_seconds(0.0);
     let belief = Gaussian::from_sigmas(
-        [prior.pose.x_m(), prior.pose.y_m(), prior.pose.yaw_rad(), 0.0, 0.0, 0.0],
-        [prior.sigma_position_m, prior.sigma_position_m, prior.sigma_heading_rad, 0.01, 0.01, 0.01],
+        [prior.pose.x_m(), prior.pose.y_m(), prior.pose.yaw_rad(), 0.0, 0.0, 0.0, 0.0],
+        [prior.sigma_position_m, prior.sigma_position_m, prior.sigma_heading_rad, 0.01, 0.01, 0.01, 0.0005],
     );
     let mut filter = Ekf::new(PairOfWheels { walks: WALKS }, from, belief);
     let noise = &settings.odometry.wheel_noise;
-    let sides = [
-        (PairOfWheels::LEFT, noise.left_m_per_sqrt_s),
-        (PairOfWheels::RIGHT, noise.right_m_per_sqrt_s),
-    ];
+    let sides =
+        [(PairOfWheels::LEFT, noise.left_m_per_sqrt_s), (PairOfWheels::RIGHT, noise.right_m_per_sqrt_s)];
     let ticks = rolled(recorded, calibrated.drive.wheel_radius_m);
     let mut wheels = Vec::new();
     for tick in &ticks {
@@ -165,7 +168,7 @@ pub(super) fn filtered(
             wheels.push(Measurement { time: tick.middle(), sensor: Sensor::of(state), value, variance });
         }
     }
-    let yaw_rate = Sensor::of(PairOfWheels::YAW_RATE);
+    let yaw_rate = Sensor::sum(&[(PairOfWheels::YAW_RATE, 1.0), (PairOfWheels::GYRO_BIAS, 1.0)]);
     let gyro = readings(&values(&recorded.gyro), yaw_rate, settings.gyro.sigma_rad_s);
     let mut positions = Vec::new();
     if let Fixes::Taken(factor) = fixes {

@@ -15,7 +15,7 @@ use crate::study::Study;
 
 const LEAD: &str = "A skid-steered robot of the size of a Pioneer AT on four closed paths, localized in three ways on the same \
 runs: odometry as the firmware has it; odometry with an effective radius and an effective track width found on other runs; and \
-an extended Kalman filter whose states are the pose, the speeds of both sides and the yaw rate, which a gyro measures. The error \
+an extended Kalman filter whose states are the pose, the speeds of both sides, the yaw rate and the bias of the gyro that measures it. The error \
 is that of the final position over the distance driven. Source: Goel, Roumeliotis and Sukhatme 1999.";
 const NOTE: &str = "How the simulated wheels slip in turns was chosen so that the odometry, raw and calibrated, errs about as \
 much as the published one: the first two columns say that the runs are comparable, no more. The filter's column is a result.";
@@ -63,7 +63,8 @@ fn methods(page: &mut Study, errors: &Errors, calibrated: &Effective) {
         ),
         ["path", "raw", "calibrated", "EKF", "published raw / calibrated / EKF"],
     );
-    let mut bars = Figure::new(Axis::category("path"), Axis::new("final error over distance", "%").from_zero());
+    let mut bars =
+        Figure::new(Axis::category("path"), Axis::new("final error over distance", "%").from_zero());
     let names: Vec<String> = errors.iter().map(|(path, _)| path.words().to_owned()).collect();
     let mut means = [Vec::new(), Vec::new(), Vec::new()];
     for (path, own) in errors {
@@ -83,7 +84,11 @@ fn methods(page: &mut Study, errors: &Errors, calibrated: &Effective) {
         cells.push(format!("{} / {} / {} %", published[0], published[1], published[2]));
         rows = rows.row(cells);
         if let (Some(filter), Some(gap)) = (estimates[2], Estimate::of(&differences(own, 1, 2))) {
-            filter_words.push(format!("{} {}", path.words(), with_interval(filter.mean, filter.interval, "%")));
+            filter_words.push(format!(
+                "{} {}",
+                path.words(),
+                with_interval(filter.mean, filter.interval, "%")
+            ));
             good &= filter.interval[1] < FILTER_PERCENT;
             words.push(format!("{} {}", path.words(), with_interval(gap.mean, gap.interval, "%")));
             separate &= gap.interval[0] > 0.0;
@@ -175,8 +180,10 @@ fn laps_claim(page: &mut Study, long: &[Laps]) {
     let Some(first) = long.first() else { return };
     let end = length - 1;
     let times = &first.times_s[..length];
-    let rms = |pick: fn(&Laps) -> &Vec<f64>, k: usize| root_mean_square(long.iter().map(|own| pick(own)[k].sqrt()));
-    let Some(gain) = Estimate::of(&long.iter().map(|own| own.without[end] - own.with[end]).collect::<Vec<_>>())
+    let rms =
+        |pick: fn(&Laps) -> &Vec<f64>, k: usize| root_mean_square(long.iter().map(|own| pick(own)[k].sqrt()));
+    let Some(gain) =
+        Estimate::of(&long.iter().map(|own| own.without[end] - own.with[end]).collect::<Vec<_>>())
     else {
         return;
     };
@@ -204,7 +211,9 @@ fn laps_claim(page: &mut Study, long: &[Laps]) {
         .trace(Trace::band("indoors", &[indoors, outdoors], &[0.0; 2], &[greatest; 2], Colour::Muted))
         .trace(Trace::line("without fixes", times, &without, Colour::Series(1)))
         .trace(Trace::line("with fixes", times, &with, Colour::Series(0)))
-        .trace(Trace::line("sigma of the filter with fixes", times, &sigma, Colour::Series(0)).dash(Dash::Dot));
+        .trace(
+            Trace::line("sigma of the filter with fixes", times, &sigma, Colour::Series(0)).dash(Dash::Dot),
+        );
     figure(
         page,
         drawing,
