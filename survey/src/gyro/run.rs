@@ -147,9 +147,10 @@ pub(super) fn begun(run: &SimulatedRun) -> Option<Ekf<Unicycle, 5>> {
     let prior = told(run, from)?;
     let walks = RandomWalks { speed_m_s: WALK_M_S, yaw_rate_rad_s: WALK_RAD_S, ..RandomWalks::default() };
     let pose = prior.pose;
+    // The robot has driven at these speeds up to now: a wider prior would be wrong, and lasts for seconds in the yaw rate.
     let belief = Gaussian::from_sigmas(
         [pose.x_m(), pose.y_m(), pose.yaw_rad(), SPEED_M_S, YAW_RATE_RAD_S],
-        [prior.sigma_position_m, prior.sigma_position_m, prior.sigma_heading_rad, 0.01, 0.01],
+        [prior.sigma_position_m, prior.sigma_position_m, prior.sigma_heading_rad, 1e-3, 1e-3],
     );
     Some(Ekf::new(Unicycle { walks }, from, belief))
 }

@@ -18,7 +18,7 @@ pub use methods::{Method, relative_errors};
 
 pub(crate) const NAME: &str = "skid-steer";
 /// Seeds where none are asked for.
-const SEEDS: usize = 60;
+const SEEDS: usize = 120;
 /// Fewer give no interval worth printing.
 const LEAST_SEEDS: usize = 10;
 /// Runs on which odometry is calibrated.
