@@ -6,6 +6,7 @@ use pleiad_estimation::sample::Reading;
 use pleiad_estimation::single::{Ekf, Measurement, Process, Sensor};
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_recording::RobotRecording;
+use pleiad_report::quantity;
 use pleiad_sim_peers::{Prior, Scenario, SimulatedRun, simulate};
 
 use crate::error::SurveyError;
@@ -176,6 +177,11 @@ pub(crate) fn times(first: &[f64], second: &[f64]) -> Option<(f64, [f64; 2])> {
 pub(crate) fn times_words((ratio, [low, high]): (f64, [f64; 2])) -> String {
     let decimals = if ratio < 10.0 { 2 } else { 1 };
     format!("{ratio:.decimals$} ({low:.decimals$}..{high:.decimals$}) times")
+}
+
+/// A length in metres or an angle in milliradians, for people.
+pub(crate) fn small(value: f64, unit: &str) -> String {
+    if unit == "rad" { quantity(1e3 * value, "mrad") } else { quantity(value, unit) }
 }
 
 /// The root of a mean square.

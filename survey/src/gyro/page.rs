@@ -2,14 +2,14 @@
 
 use pleiad_estimation::Timestamp;
 use pleiad_estimation::single::Unicycle;
-use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace, quantity};
+use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace};
 use serde_json::json;
 
 use super::run::{JUDGED_S, Judged, Variant, begun, judged, measurements, recorded};
 use super::{NAME, Wheels};
 use crate::error::SurveyError;
 use crate::pages::{blank, claim, figure, number, table};
-use crate::solo::{ROBOT, beliefs_at, error_of, pose_of, times, times_words};
+use crate::solo::{ROBOT, beliefs_at, error_of, pose_of, small, times, times_words};
 use crate::study::Study;
 
 const LEAD: &str = "One robot, two encoders and a gyro in one extended Kalman filter whose speed and yaw rate are random walks. \
@@ -83,8 +83,8 @@ fn claims(page: &mut Study, all: &[Judged]) {
         let Some(ratio) = times(worse, better) else { return };
         let measured = format!(
             "{} instead of {} (RMS at the end): {} smaller",
-            quantity(root(better), unit),
-            quantity(root(worse), unit),
+            small(root(better), unit),
+            small(root(worse), unit),
             times_words(ratio),
         );
         number(page, name, ratio.0);
@@ -122,8 +122,8 @@ fn summary(all: &[Judged], runs: usize) -> Table {
         let consistent = if own.nees.is_consistent() { "yes" } else { "no" };
         rows.row([
             own.variant.words().to_owned(),
-            quantity(root(&own.position_m2), "m"),
-            quantity(root(&own.heading_rad2), "rad"),
+            small(root(&own.position_m2), "m"),
+            small(root(&own.heading_rad2), "rad"),
             format!("{:.2}", own.nees.overall.unwrap_or(f64::NAN)),
             consistent.to_owned(),
         ])

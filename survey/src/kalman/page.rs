@@ -23,7 +23,7 @@ const WALK_BOUND: f64 = 1e-12;
 /// That of Kalata's: its square roots cancel four digits at the smallest index.
 const KALATA_BOUND: f64 = 1e-10;
 const LEAD: &str = "The Kalman filter on systems whose answer is known in closed form: a scalar random walk and a target of \
-constant velocity. It is the arithmetic under every other study: `pleiad_estimation::linear`. Sources: Kalman 1960; \
+constant velocity. The filters of the studies of one robot are made of the same two steps: `pleiad_estimation::linear`. Sources: Kalman 1960; \
 Bar-Shalom, Li and Kirubarajan 2001; Kalata 1984.";
 
 pub(super) fn study(seeds: &[u64]) -> Result<Study, SurveyError> {

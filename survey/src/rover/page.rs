@@ -1,6 +1,6 @@
 //! The study's claims, tables and figures.
 
-use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace, quantity, with_interval};
+use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace, with_interval};
 use serde_json::json;
 
 use super::NAME;
@@ -9,7 +9,7 @@ use super::run::{JUDGED_S, Method, Outcome, on, outcome, recorded};
 use crate::error::SurveyError;
 use crate::monte_carlo::{Estimate, over_seeds};
 use crate::pages::{blank, claim, figure, number, table};
-use crate::solo::{ROBOT, root_mean_square, times, times_words};
+use crate::solo::{ROBOT, root_mean_square, small, times, times_words};
 use crate::study::Study;
 
 const LEAD: &str = "A rover drives 18 m in S-curves at 0.1 m/s. It has encoders, a rear steering angle and a gyro at 50 Hz, and a \
@@ -83,7 +83,7 @@ fn order(page: &mut Study, all: &All) {
             .map(|(method, own)| {
                 let spread = rms(own, end(), square);
                 number(page, &format!("{}_{name}_rms_{unit}", method.key()), spread);
-                format!("{} {}", method.words(), quantity(spread, unit))
+                format!("{} {}", method.words(), small(spread, unit))
             })
             .collect();
         let steps = [(0, 1), (1, 2), (2, 3)].map(|(a, b)| compared(&all[a], &all[b], square));
@@ -135,8 +135,8 @@ fn bounded(page: &mut Study, all: &All) {
              {:.3} times those after a minute",
             word(&slow),
             word(&fast),
-            quantity(sigma(2, end()), "rad"),
-            quantity(sigma(3, end()), "rad"),
+            small(sigma(2, end()), "rad"),
+            small(sigma(3, end()), "rad"),
             settled[0],
             settled[1],
         ),
@@ -176,7 +176,7 @@ fn honest(page: &mut Study, all: &All) {
     for (method, own) in Method::ALL.iter().zip(all).skip(1) {
         let Some(ratio) = honesty(own) else { return };
         words.push(format!("{} {}", method.words(), with_interval(ratio.mean, ratio.interval, "")));
-        holds &= ratio.interval[0] < 1.25 && ratio.interval[1] > 0.8;
+        holds &= (0.8..=1.25).contains(&ratio.mean);
         number(page, &format!("{}_heading_nees", method.key()), ratio.mean);
         number(page, &format!("{}_heading_nees_interval", method.key()), json!(ratio.interval));
     }
@@ -208,7 +208,7 @@ fn lateness(page: &mut Study, lates: &[Late]) {
     claim(
         page,
         "Applied at their arrival instead they make the heading worse",
-        format!("{} instead of {} (RMS over the run)", quantity(of(1), "rad"), quantity(of(0), "rad")),
+        format!("{} instead of {} (RMS over the run)", small(of(1), "rad"), small(of(0), "rad")),
         worse.interval[0] > 0.0,
     );
     number(page, "late_runs_equal", equal);
@@ -224,9 +224,9 @@ fn summary(all: &All) -> Table {
         let sigma = own.first().map_or(f64::NAN, |own| own.sigma_heading_rad[end()]);
         rows.row([
             method.words().to_owned(),
-            quantity(rms(own, end(), position_m2), "m"),
-            quantity(rms(own, end(), heading_rad2), "rad"),
-            quantity(sigma, "rad"),
+            small(rms(own, end(), position_m2), "m"),
+            small(rms(own, end(), heading_rad2), "rad"),
+            small(sigma, "rad"),
         ])
     })
 }

@@ -149,7 +149,7 @@ fn fixes(page: &mut Study, short: &[FixOutcome], long: &[Laps]) {
     let rms = |pick: fn(&FixOutcome) -> f64| root_mean_square(short.iter().map(|own| pick(own).sqrt()));
     claim(
         page,
-        "Fixes of 0.8 m that cannot help do not hurt",
+        "Fixes of 0.8 m do not hurt a filter that errs by far less",
         format!(
             "square of 20 m, a fix a second: {} with fixes, {} without (RMS); mean square changes by {}",
             quantity(rms(|own| own.with), "m"),
