@@ -1,7 +1,7 @@
 //! The study's claims, tables and figures.
 
-use pleiad_estimation::Timestamp;
 use pleiad_estimation::single::Unicycle;
+use pleiad_estimation::{Pose2, Timestamp};
 use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace};
 use serde_json::json;
 
@@ -161,8 +161,8 @@ fn one_run(page: &mut Study, seed: u64) -> Result<(), SurveyError> {
     let mut map = Figure::new(Axis::new("east", "m"), Axis::new("north", "m")).equal_aspect();
     map = map.trace(Trace::path(
         "truth",
-        &truth.iter().map(|pose| pose.x_m()).collect::<Vec<_>>(),
-        &truth.iter().map(|pose| pose.y_m()).collect::<Vec<_>>(),
+        &truth.iter().map(Pose2::x_m).collect::<Vec<_>>(),
+        &truth.iter().map(Pose2::y_m).collect::<Vec<_>>(),
         Colour::Ink,
     ));
     let mut headings = Figure::new(Axis::new("time", "s"), Axis::new("heading error, wheels", "rad"))

@@ -1,5 +1,6 @@
 //! The study's claims, tables and figures.
 
+use pleiad_estimation::{Pose2, Timestamp};
 use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace, with_interval};
 use serde_json::json;
 
@@ -23,6 +24,8 @@ const LAST: std::ops::Range<usize> = 12..18;
 /// A heading error is bounded if its mean square grows by less than this share from the first to the last minute.
 const BOUNDED: f64 = 0.5;
 
+/// The square of an error at a time of judgement.
+type Square = fn(&Outcome, usize) -> f64;
 /// All runs by method: `[method][run]`.
 type All = Vec<Vec<Outcome>>;
 
@@ -59,22 +62,18 @@ fn end() -> usize {
 }
 
 /// Root mean square over the runs.
-fn rms(outcomes: &[Outcome], time: usize, square: fn(&Outcome, usize) -> f64) -> f64 {
+fn rms(outcomes: &[Outcome], time: usize, square: Square) -> f64 {
     root_mean_square(outcomes.iter().map(|own| square(own, time).sqrt()))
 }
 
 /// How many times the error of the first method at the end is that of the second.
-fn compared(
-    first: &[Outcome],
-    second: &[Outcome],
-    square: fn(&Outcome, usize) -> f64,
-) -> Option<(f64, [f64; 2])> {
+fn compared(first: &[Outcome], second: &[Outcome], square: Square) -> Option<(f64, [f64; 2])> {
     let squares = |own: &[Outcome]| own.iter().map(|own| square(own, end())).collect::<Vec<f64>>();
     times(&squares(first), &squares(second))
 }
 
 fn order(page: &mut Study, all: &All) {
-    let quantities: [(&str, &str, fn(&Outcome, usize) -> f64); 2] =
+    let quantities: [(&str, &str, Square); 2] =
         [("position", "m", position_m2), ("heading", "rad", heading_rad2)];
     for (name, unit, square) in quantities {
         let spreads: Vec<String> = Method::ALL
@@ -277,10 +276,9 @@ fn paths(page: &mut Study, seed: u64) -> Result<(), SurveyError> {
     let (scenario, run) = recorded(seed)?;
     let seconds: Vec<f64> = (1..=181).map(f64::from).collect();
     let track = &run.tracks[&ROBOT];
-    let truth: Vec<_> =
-        seconds.iter().map(|own| track.pose_at(pleiad_estimation::Timestamp::from_seconds(*own))).collect();
-    let column = |poses: &[pleiad_estimation::Pose2]| -> [Vec<f64>; 2] {
-        [poses.iter().map(|own| own.x_m()).collect(), poses.iter().map(|own| own.y_m()).collect()]
+    let truth: Vec<_> = seconds.iter().map(|own| track.pose_at(Timestamp::from_seconds(*own))).collect();
+    let column = |poses: &[Pose2]| -> [Vec<f64>; 2] {
+        [poses.iter().map(Pose2::x_m).collect(), poses.iter().map(Pose2::y_m).collect()]
     };
     let [x, y] = column(&truth);
     let mut map = Figure::new(Axis::new("east", "m"), Axis::new("north", "m"))

@@ -1,5 +1,6 @@
 //! The study's claims, tables and figures.
 
+use pleiad_estimation::Pose2;
 use pleiad_report::{Axis, Colour, Dash, Figure, Table, Trace, quantity, with_interval};
 use serde_json::json;
 
@@ -227,8 +228,8 @@ fn one_run(page: &mut Study, seed: u64, calibrated: &Effective) -> Result<(), Su
     let (scenario, run) = driven(Path::Square, seed, &Vec::new())?;
     let truth = &run.recording.robots[&ROBOT].truth;
     let times: Vec<_> = truth.iter().map(|own| own.time).collect();
-    let columns = |poses: &[pleiad_estimation::Pose2]| -> [Vec<f64>; 2] {
-        [poses.iter().map(|own| own.x_m()).collect(), poses.iter().map(|own| own.y_m()).collect()]
+    let columns = |poses: &[Pose2]| -> [Vec<f64>; 2] {
+        [poses.iter().map(Pose2::x_m).collect(), poses.iter().map(Pose2::y_m).collect()]
     };
     let [x, y] = columns(&truth.iter().map(|own| own.pose).collect::<Vec<_>>());
     let mut map = Figure::new(Axis::new("east", "m"), Axis::new("north", "m"))
