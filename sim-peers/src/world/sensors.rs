@@ -121,7 +121,7 @@ impl<'a> Channels<'a> {
         let noise = &self.settings.odometry.wheel_noise;
         let sigmas = [noise.left_m_per_sqrt_s, noise.right_m_per_sqrt_s];
         let rolled = &self.drive.wheel_angles;
-        if sigmas == [0.0; 2] {
+        if sigmas.iter().all(|sigma| *sigma == 0.0) {
             return rolled.clone();
         }
         let mut streams =
