@@ -22,9 +22,10 @@ pub enum Drive {
         /// Effective over geometric track.
         track_ratio: f64,
     },
-    /// Steered front wheels; the steering angle comes with the surroundings.
+    /// Steered wheels; the steering angle comes with the surroundings.
     CarLike {
-        /// Distance between the axles, metres.
+        /// From the axle that is not steered, where the robot's frame is, forward to the one that is, metres:
+        /// negative for rear steering.
         wheelbase_m: f64,
     },
 }

@@ -2,14 +2,21 @@
 //! and the claim it is known for with what was measured.
 //!
 //! A study uses the filters of `estimation`, the calibration of `mismatch` and the simulator of `sim-peers`; nothing
-//! is simulated or filtered here by means of its own.
+//! is simulated or filtered here by means of its own, but for the linear systems of `kalman`, which are their own
+//! law.
 
 mod error;
+pub mod gyro;
 pub mod hypotheses;
+pub mod kalman;
 pub mod map;
 mod monte_carlo;
 pub mod motion_policies;
+mod pages;
+pub mod rover;
+pub mod skid_steer;
 pub mod slam;
+mod solo;
 mod study;
 pub mod umbmark;
 
@@ -25,6 +32,14 @@ pub const STUDIES: &[Known] = &[
         run: umbmark::run,
     },
     Known { name: "map", about: "odometry errors per metre from range scans against a map", run: map::run },
+    Known { name: "kalman", about: "the filter itself: steady states, consistency", run: kalman::run },
+    Known { name: "gyro", about: "wheels and a gyro; what correlated noise is worth", run: gyro::run },
+    Known {
+        name: "rover",
+        about: "encoders, rear steering, gyro, and a slow or late sun sensor",
+        run: rover::run,
+    },
+    Known { name: "skid-steer", about: "raw and calibrated odometry, gyro and GPS", run: skid_steer::run },
     Known {
         name: "slam",
         about: "EKF SLAM: what a map converges to, what the choice of the error does to it, association, bearings alone",

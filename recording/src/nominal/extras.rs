@@ -38,10 +38,16 @@ pub(super) fn drive(table: &Table) -> Result<Option<Drive>, Wrong> {
             .filter(|&value| Domain::Positive.holds(value))
             .ok_or_else(|| wrong(key, found, Domain::Positive.description()))
     };
+    let wheelbase = || {
+        let found = table.get("wheelbase_m");
+        let expected = "a finite number other than 0: negative if the rear axle is steered";
+        let holds = |value: &f64| value.is_finite() && *value != 0.0;
+        found.and_then(number).filter(holds).ok_or_else(|| wrong("wheelbase_m", found, expected))
+    };
     let (drive, own) = match value.as_str() {
         Some("differential") => (Drive::Differential, None),
         Some("skid_steer") => (Drive::SkidSteer { track_ratio: length("track_ratio")? }, Some("track_ratio")),
-        Some("car_like") => (Drive::CarLike { wheelbase_m: length("wheelbase_m")? }, Some("wheelbase_m")),
+        Some("car_like") => (Drive::CarLike { wheelbase_m: wheelbase()? }, Some("wheelbase_m")),
         _ => return Err(wrong("drive", Some(value), "\"differential\", \"skid_steer\" or \"car_like\"")),
     };
     for key in &DRIVE[1..] {

@@ -123,6 +123,12 @@ fn a_drive_holds_for_the_team_unless_a_robot_has_its_own() {
         drive(&format!("{team}drive = \"car_like\"\nwheelbase_m = 0.5\n")),
         Drive::CarLike { wheelbase_m: 0.5 }
     );
+    // Negative: the rear axle is steered.
+    assert_eq!(
+        drive(&format!("{team}drive = \"car_like\"\nwheelbase_m = -0.5\n")),
+        Drive::CarLike { wheelbase_m: -0.5 }
+    );
+    assert!(read(&format!("{team}drive = \"car_like\"\nwheelbase_m = 0.0\n")).is_err());
     assert_eq!(read(&team).expect("sound").1, Vec::<String>::new());
 }
 

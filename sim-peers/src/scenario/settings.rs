@@ -232,6 +232,8 @@ pub struct Odometry {
     pub noise: MotionNoise,
     /// The same, from one instant to the next not at random.
     pub lasting: LastingSlip,
+    /// How the wheels turn without the body noticing.
+    pub wheel_noise: WheelNoise,
 }
 
 impl Default for Odometry {
@@ -240,9 +242,22 @@ impl Default for Odometry {
             kind: OdometryKind::Velocity,
             rate_hz: 25.0,
             noise: MotionNoise::default(),
+            wheel_noise: WheelNoise::default(),
             lasting: LastingSlip::default(),
         }
     }
+}
+
+/// White noise of the wheels' readings: over a tick of `dt` seconds in which it turns, the tread of a wheel moves by
+/// `n ~ N(0, sigma^2 dt)` more than the ground under it. The body does not notice: it moves by what was rolled. So the
+/// mean speed of a wheel over a tick is read with the variance `sigma^2 / dt`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WheelNoise {
+    /// Of the left wheel, m/sqrt(s).
+    pub left_m_per_sqrt_s: f64,
+    /// Of the right wheel, m/sqrt(s).
+    pub right_m_per_sqrt_s: f64,
 }
 
 /// Coloured slip: velocities of the body besides those of its wheels, each an Ornstein-Uhlenbeck process

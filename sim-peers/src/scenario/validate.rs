@@ -95,6 +95,7 @@ impl Check {
         self.above_zero("drive.wheelbase_m", settings.drive.wheelbase_m)?;
         self.above_zero("drive.max_steer_rad", settings.drive.max_steer_rad)?;
         self.between("drive.max_steer_rad", settings.drive.max_steer_rad, 0.0, GREATEST_STEER_RAD)?;
+        self.not_negative("drive.steer_sigma_rad", settings.drive.steer_sigma_rad)?;
         for (key, value) in settings.declared.values() {
             let key = format!("declared.{key}");
             if key.ends_with("wheel_radius") || key.ends_with("track_width") || key.ends_with("gyro_scale") {
@@ -175,6 +176,9 @@ impl Check {
         self.not_negative("odometry.noise.yaw_rad_per_sqrt_s", noise.yaw_rad_per_sqrt_s)?;
         self.not_negative("odometry.noise.speed_m_per_sqrt_m", noise.speed_m_per_sqrt_m)?;
         self.not_negative("odometry.noise.yaw_rad_per_sqrt_rad", noise.yaw_rad_per_sqrt_rad)?;
+        let wheels = &settings.odometry.wheel_noise;
+        self.not_negative("odometry.wheel_noise.left_m_per_sqrt_s", wheels.left_m_per_sqrt_s)?;
+        self.not_negative("odometry.wheel_noise.right_m_per_sqrt_s", wheels.right_m_per_sqrt_s)?;
         let lasting = &settings.odometry.lasting;
         self.not_negative("odometry.lasting.speed_m_s", lasting.speed_m_s)?;
         self.not_negative("odometry.lasting.lateral_m_s", lasting.lateral_m_s)?;

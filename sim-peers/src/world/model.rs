@@ -46,7 +46,7 @@ impl Firmware {
         Self {
             radius_m,
             track_m: settings.drive.effective_track_m(track_m),
-            wheelbase_m: car.then_some(settings.drive.wheelbase_m),
+            wheelbase_m: car.then_some(settings.drive.steered_ahead_m()),
             radius_ratio: true_radius_m / radius_m,
             track_ratio: true_track_m / track_m,
         }

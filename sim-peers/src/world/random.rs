@@ -39,8 +39,14 @@ pub(super) enum Channel {
     Lasting = 17,
     /// The spread of heavy-tailed noise of a robot's own channels: an item per channel.
     OwnTails = 18,
+    /// What the left wheel turns without rolling.
+    LeftWheel = 19,
+    /// The same of the right wheel.
+    RightWheel = 20,
+    /// The steering angle.
+    Steer = 21,
     /// Noise of range scans.
-    Scan = 19,
+    Scan = 22,
 }
 
 /// Ends every key, so that no other use of a bare seed shares a stream with the world.

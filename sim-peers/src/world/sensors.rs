@@ -82,8 +82,8 @@ impl<'a> Channels<'a> {
         let ticks: Vec<Timestamp> = self.track().ticks().collect();
         let angles: Vec<[f64; 2]> = ticks
             .iter()
-            .zip(&self.drive.wheel_angles)
-            .map(|(time, angles)| self.encoders(*time, *angles))
+            .zip(self.turned_angles(&ticks))
+            .map(|(time, angles)| self.encoders(*time, angles))
             .collect();
         let moved = |tick: usize| {
             let turned = [0, 1].map(|wheel| angles[tick + 1][wheel] - angles[tick][wheel]);
@@ -116,6 +116,31 @@ impl<'a> Channels<'a> {
             .collect()
     }
 
+    /// Angles of the wheels at every tick, with what they turn without rolling.
+    fn turned_angles(&self, ticks: &[Timestamp]) -> Vec<[f64; 2]> {
+        let noise = &self.settings.odometry.wheel_noise;
+        let sigmas = [noise.left_m_per_sqrt_s, noise.right_m_per_sqrt_s];
+        let rolled = &self.drive.wheel_angles;
+        if sigmas.iter().all(|sigma| *sigma == 0.0) {
+            return rolled.clone();
+        }
+        let mut streams =
+            [Channel::LeftWheel, Channel::RightWheel].map(|channel| self.seed.stream(self.robot, channel));
+        let mut idle = [0.0; 2];
+        let mut angles = rolled.clone();
+        for tick in 1..angles.len() {
+            let duration_s = ticks[tick].seconds_since(ticks[tick - 1]);
+            for wheel in 0..2 {
+                let drawn = normal(&mut streams[wheel]);
+                if rolled[tick][wheel].to_bits() != rolled[tick - 1][wheel].to_bits() {
+                    idle[wheel] += sigmas[wheel] * duration_s.sqrt() * drawn / self.settings.wheel_radius_m;
+                }
+                angles[tick][wheel] += idle[wheel];
+            }
+        }
+        angles
+    }
+
     /// Wheel angles as the encoders read them.
     fn encoders(&self, time: Timestamp, angles: [f64; 2]) -> [f64; 2] {
         let mut context = self.context(time);
@@ -123,14 +148,17 @@ impl<'a> Channels<'a> {
         sensors::encoders(&self.model, &context)
     }
 
-    /// Steering angles of a car at every tick, as its servo holds them; none of any other robot.
+    /// Steering angles of a car at every tick, as its servo holds them but for their noise; none of any other
+    /// robot.
     pub(super) fn steer(&self) -> Vec<SteerSample> {
         if self.settings.drive.kind != DriveKind::CarLike {
             return Vec::new();
         }
+        let mut stream = self.seed.stream(self.robot, Channel::Steer);
+        let sigma_rad = self.settings.drive.steer_sigma_rad;
         let sample = |(time, angle_rad): (Timestamp, &f64)| SteerSample {
             time: self.stamp(time),
-            angle_rad: *angle_rad,
+            angle_rad: *angle_rad + sigma_rad * normal(&mut stream),
         };
         self.track().ticks().zip(&self.drive.steer_rad).map(sample).collect()
     }

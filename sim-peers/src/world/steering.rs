@@ -1,4 +1,4 @@
-//! The front wheels of a car.
+//! The steered wheels of a car.
 
 use super::policy::Twist;
 use crate::scenario::{DriveKind, RobotSettings};
@@ -10,6 +10,7 @@ const STEERABLE_M_S: f64 = 1e-3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Steering {
     car: bool,
+    /// Negative for rear steering.
     wheelbase_m: f64,
     max_steer_rad: f64,
     time_constant_s: f64,
@@ -21,7 +22,7 @@ impl Steering {
     pub(super) fn new(settings: &RobotSettings) -> Self {
         Self {
             car: settings.drive.kind == DriveKind::CarLike,
-            wheelbase_m: settings.drive.wheelbase_m,
+            wheelbase_m: settings.drive.steered_ahead_m(),
             max_steer_rad: settings.drive.max_steer_rad,
             time_constant_s: settings.servo_time_constant_turn_s,
             target_rad: 0.0,
@@ -39,7 +40,7 @@ impl Steering {
         if !self.car {
             return wanted;
         }
-        let most = wanted.forward_m_s.abs() * self.max_steer_rad.tan() / self.wheelbase_m;
+        let most = wanted.forward_m_s.abs() * self.max_steer_rad.tan() / self.wheelbase_m.abs();
         Twist { yaw_rate_rad_s: wanted.yaw_rate_rad_s.clamp(-most, most), ..wanted }
     }
 

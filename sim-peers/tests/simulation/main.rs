@@ -6,6 +6,7 @@ mod channels;
 mod kidnap;
 mod manoeuvres;
 mod motion;
+mod readings;
 mod scenario_errors;
 mod shipped;
 mod sightings;
