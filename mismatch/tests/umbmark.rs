@@ -1,5 +1,7 @@
 //! UMBmark on runs whose wheels are known: arcs in closed form, and recordings that are no runs.
 
+#![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
+
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_mismatch::calibration::umbmark::{

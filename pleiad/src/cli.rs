@@ -1,7 +1,7 @@
 //! The command line, as clap sees it.
 
-mod slam;
 mod calibrate;
+mod slam;
 mod survey;
 mod values;
 
@@ -12,8 +12,8 @@ use pleiad_benchmark::Asked;
 use pleiad_estimation::strategy::StrategyKind;
 use pleiad_sim_peers::scenario::ManoeuvreKind;
 
-pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
+pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
 pub use values::{AbsoluteArg, LandmarksArg};
 

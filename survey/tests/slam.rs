@@ -1,5 +1,7 @@
 //! The study of SLAM on a few seeds, and mistakes planted in it.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
 use pleiad_estimation::joint::ErrorForm;
 use pleiad_estimation::slam::Association;
 use pleiad_sim_peers::Scenario;

@@ -278,15 +278,15 @@ fn near(pose: &Pose2, truth: &Pose2) -> bool {
 impl Run {
     /// When one hypothesis, the right one, was believed within a stretch of time and then until its end.
     pub(super) fn settled_s(&self, from_s: f64, until_s: f64) -> Option<f64> {
-        self.from_which(from_s, until_s, |moment| moment.one && moment.right)
+        self.beginning(from_s, until_s, |moment| moment.one && moment.right)
     }
 
     /// When any hypothesis was believed within a stretch of time and then some one until its end.
     pub(super) fn decided_s(&self, from_s: f64, until_s: f64) -> Option<f64> {
-        self.from_which(from_s, until_s, |moment| moment.one)
+        self.beginning(from_s, until_s, |moment| moment.one)
     }
 
-    fn from_which(&self, from_s: f64, until_s: f64, holds: impl Fn(&Moment) -> bool) -> Option<f64> {
+    fn beginning(&self, from_s: f64, until_s: f64, holds: impl Fn(&Moment) -> bool) -> Option<f64> {
         let within = self.moments.iter().filter(|moment| (from_s..until_s).contains(&moment.time_s));
         let mut since = None;
         for moment in within {

@@ -158,6 +158,7 @@ mod tests {
             let p = walk.steady_variance();
             // P = R (P + Q) / (P + Q + R).
             assert!((p - r * (p + q) / (p + q + r)).abs() < 1e-15 * r, "{q} {r}");
+            #[allow(clippy::manual_midpoint, reason = "as it is printed")]
             let as_printed = (-q + (q * q + 4.0 * q * r).sqrt()) / 2.0;
             assert!((p - as_printed).abs() < 1e-14 * (q + r));
         }

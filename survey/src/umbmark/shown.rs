@@ -115,7 +115,7 @@ pub(super) fn recovered(drawn: &[(WheelErrors, WheelErrors)]) -> Shown {
         Figure::new(Axis::new("injected, less 1", "1e-3"), Axis::new("recovered, less 1", "1e-3"));
     figure =
         figure.trace(Trace::line("equal", &[-30.0, 30.0], &[-30.0, 30.0], Colour::Muted).dash(Dash::Dot));
-    let ratios: [(&str, fn(WheelErrors) -> f64); 3] =
+    let ratios: [(&str, Factor); 3] =
         [("E_d", |errors| errors.e_d), ("E_b", |errors| errors.e_b), ("E_s", |errors| errors.e_s)];
     for (series, (name, pick)) in ratios.into_iter().enumerate() {
         let [injected, found] = of(pick);
@@ -126,6 +126,9 @@ pub(super) fn recovered(drawn: &[(WheelErrors, WheelErrors)]) -> Shown {
         "Robots drawn at random, one procedure each: recovered against injected.".to_owned(),
     )
 }
+
+/// Picks one of the ratios.
+type Factor = fn(WheelErrors) -> f64;
 
 fn columns(points: &[[f64; 2]]) -> [Vec<f64>; 2] {
     [0, 1].map(|axis| points.iter().map(|point| point[axis]).collect())

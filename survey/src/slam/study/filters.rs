@@ -130,7 +130,8 @@ fn mean(values: impl Iterator<Item = Option<f64>>) -> f64 {
 }
 
 pub(super) fn association(all: &[Measured], parts: &mut Parts) {
-    let cases: [(&str, fn(&Measured) -> &Ended); 3] = [
+    type Of = fn(&Measured) -> &Ended;
+    let cases: [(&str, Of); 3] = [
         ("clean", |run| &run.nearest),
         ("gate a thousand times too wide", |run| &run.wide_gate),
         ("a look-alike 0.35 m beside every landmark", |run| &run.twins),
