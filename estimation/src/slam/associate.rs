@@ -40,7 +40,7 @@ pub struct Choice {
 /// the caller updates with it, takes both from the candidates, and asks again with the innovations as they then
 /// are. So every later pair is judged given the earlier ones, and the error of the vehicle, common to the scan, is
 /// taken out once: pairs that are compatible one by one and not together are told apart (joint compatibility
-/// [neira2001], taken sequentially).
+/// (`neira2001`), taken sequentially).
 pub fn associate(candidates: &[Candidate], margin: f64) -> Option<Choice> {
     let rival = |one: &Candidate, other: &Candidate| {
         let same = (one.sighting == other.sighting) != (one.landmark == other.landmark);

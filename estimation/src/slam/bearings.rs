@@ -1,4 +1,4 @@
-//! Landmarks of which only bearings are known: they wait until their bearings cross well [bailey2003].
+//! Landmarks of which only bearings are known: they wait until their bearings cross well (`bailey2003`).
 
 use super::initialize::{Initialized, Sight, from_bearings, parallax_rad};
 use super::state::{Block, SlamState};

@@ -1,4 +1,4 @@
-//! Simultaneous localization and mapping by an extended Kalman filter [dissanayake2001]: one vehicle and the
+//! Simultaneous localization and mapping by an extended Kalman filter (`dissanayake2001`): one vehicle and the
 //! landmarks it sees in one state.
 //!
 //! **The error.** A landmark is written as a robot that never moves, left behind where the vehicle saw it: its
@@ -8,10 +8,10 @@
 //! common shift and turn, which no sighting measures, are in the null space of every update, and the limit of a
 //! landmark's covariance is the vehicle's first one at any linearization. The additive error, the textbook's,
 //! is there to be compared: it linearizes that turn at different estimates and gains what was not measured
-//! [julier2001slam, huang2007slam]. Others keep two numbers per landmark in the group SE_{n+1}(2) and pay with process
-//! noise in all of them [barrau2015slam]; here a landmark takes three and a step costs nothing.
+//! (`julier2001slam`, `huang2007slam`). Others keep two numbers per landmark in the group SE_{n+1}(2) and pay with process
+//! noise in all of them (`barrau2015slam`); here a landmark takes three and a step costs nothing.
 //!
-//! **The parts.** [`initialize`] places a landmark from one range and bearing or from two bearings; [`associate`]
+//! **The parts.** `initialize` places a landmark from one range and bearing or from two bearings; `associate`
 //! decides which landmark was seen; [`BearingTrack`] waits until bearings of one landmark cross well. None of
 //! them knows the filter. [`SlamState`] is the filter's algebra, [`Slam`] takes scans, [`SlamRun`] takes samples.
 //!

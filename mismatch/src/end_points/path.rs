@@ -56,9 +56,11 @@ pub(super) fn advice(steps: &[[f64; 3]], suffices: bool) -> String {
 fn is_square(steps: &[[f64; 3]]) -> bool {
     let (mut legs, mut turns) = (Vec::new(), Vec::new());
     let (mut leg, mut turn) = (0.0_f64, 0.0_f64);
-    for pair in steps.windows(2) {
-        let [time_s, forward, turned] = pair[1];
-        let length_s = (time_s - pair[0][0]).max(f64::MIN_POSITIVE);
+    // The first step is as long as the second.
+    let first = steps.first().zip(steps.get(1)).map(|(first, second)| second[0] - first[0]);
+    let lengths_s = first.into_iter().chain(steps.windows(2).map(|pair| pair[1][0] - pair[0][0]));
+    for (&[_, forward, turned], length_s) in steps.iter().zip(lengths_s) {
+        let length_s = length_s.max(f64::MIN_POSITIVE);
         let turning = (forward / length_s).abs() < STANDING.0 && (turned / length_s).abs() > STANDING.1;
         if turning {
             if leg > STANDING.0 {

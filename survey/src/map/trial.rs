@@ -33,9 +33,9 @@ pub struct Window {
 pub struct Trial {
     /// Both halves.
     pub windows: [Window; 2],
-    /// Per [`GAMMAS`], from wrong parameters.
+    /// Per `GAMMAS`, from wrong parameters.
     pub by_gamma: Vec<MapCalibration>,
-    /// Per [`MU_MINS`], with gamma 0, from no error: what single stretches say. `None` where nothing could be matched.
+    /// Per `MU_MINS`, with gamma 0, from no error: what single stretches say. `None` where nothing could be matched.
     pub by_mu: Vec<Option<MapCalibration>>,
     /// Mean distance from the truth at the ends of stretches, metres: with matching, and by odometry alone.
     pub off_m: [f64; 2],

@@ -1,4 +1,4 @@
-//! EKF SLAM [dissanayake2001]: a car, ranges and bearings, landmarks in the state; the three theorems on its
+//! EKF SLAM (`dissanayake2001`): a car, ranges and bearings, landmarks in the state; the three theorems on its
 //! runs, what the choice of the error does to them, and association without names.
 
 mod input;

@@ -1,4 +1,4 @@
-//! The three theorems of [dissanayake2001] as measurements on a run.
+//! The three theorems of (`dissanayake2001`) as measurements on a run.
 
 use std::collections::BTreeMap;
 

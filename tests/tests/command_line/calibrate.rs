@@ -26,7 +26,7 @@ fn squares_that_were_driven_are_calibrated_on_and_the_model_makes_a_replay_bette
     // The recordings that it left give the same calibration again.
     let runs: Vec<String> = (1..=5)
         .flat_map(|number| ["cw", "ccw"].map(|name| format!("sim/runs/before/{name}{number}")))
-        .chain(["sim/runs/before/straight1".to_owned(), "sim/runs/before/straight2".to_owned()])
+        .chain([1, 2, 3].map(|number| format!("sim/runs/before/straight{number}")))
         .collect();
     let arguments = |recordings: &[String], out: &str| {
         let words = ["calibrate", "umbmark"].map(str::to_owned).into_iter().chain(recordings.iter().cloned());
