@@ -29,7 +29,7 @@ demo *arguments:
 recordings:
     cargo test -p pleiad-recording --features recordings --test real
     cargo test -p pleiad-mismatch --features recordings --test recordings
-    cargo test -p pleiad-tests --features recordings --test recordings --test recordings_diagnosis --test recordings_mrclam_diagnosis --test recordings_faults
+    cargo test -p pleiad-tests --features recordings --test recordings --test recordings_diagnosis --test recordings_mrclam_diagnosis --test recordings_faults --test recordings_slam
 
 # Consistency over many seeded runs; takes minutes.
 monte-carlo:
@@ -58,3 +58,7 @@ deny:
 # The same bits with and without fused multiply-add.
 golden:
     .ci/golden-without-fma
+
+# Every study of the survey with the seeds it needs; takes minutes. A claim that does not hold fails it.
+survey:
+    for study in umbmark kalman gyro rover skid-steer slam hypotheses motion-policies; do cargo run -- survey $study || exit 1; done
