@@ -69,7 +69,10 @@ fn both_ways_round_name_both_errors_as_they_are() {
             [("unequal_wheel_radii", "ratio", RATIO), ("track_width_error", "relative", TRACK)]
         {
             let own = findings.findings.iter().find(|own| own.effect.as_deref() == Some(name));
-            let found = &own.expect(name).parameters[parameter];
+            let own = own.expect(name);
+            assert!(own.held_out.log_score_gain > 2.0 * own.held_out.log_score_gain_se, "{:?}", own.held_out);
+            assert!(own.configuration.contains(name), "{}", own.configuration);
+            let found = &own.parameters[parameter];
             let error = (found.ci95[1] - found.ci95[0]) / 3.92;
             scores.push(((found.value - truth) / error).powi(2));
             assert!((found.value - truth).abs() < 5.0 * WITHIN, "{name}: {found:?}");
@@ -90,5 +93,27 @@ fn a_robot_without_errors_is_given_no_name_by_its_end_points() {
         ];
         let findings = told(&both);
         assert!(findings.findings.is_empty(), "seed {seed}: {:?}", findings.findings);
+    }
+}
+
+#[test]
+fn what_a_gyro_names_is_not_named_and_corrected_a_second_time() {
+    let gyro = |scenario: &mut Scenario| {
+        for own in scenario.robots.values_mut() {
+            own.gyro.rate_hz = 50.0;
+        }
+    };
+    let both =
+        [recorded(COUNTER_CLOCKWISE, "one way", 51, gyro), recorded(CLOCKWISE, "the other", 151, gyro)];
+    let diagnosis = diagnose(&both, &DiagnoseOptions::default()).expect("recordings with nominal models");
+    for nominal in diagnosis.corrected.values() {
+        for own in nominal.robots.values() {
+            let names: Vec<_> = own.effects.iter().map(|effect| effect.active.effect().name()).collect();
+            assert!(names.contains(&"track_width_error"), "{names:?}");
+            let mut once = names.clone();
+            once.sort_unstable();
+            once.dedup();
+            assert_eq!(once.len(), names.len(), "{names:?}");
+        }
     }
 }

@@ -2,11 +2,13 @@
 
 use pleiad_estimation::geometry::wrap_angle;
 use pleiad_estimation::linear::Gaussian;
+use pleiad_estimation::motion::{DifferentialDrive, MotionModel, MotionNoise, YawSource};
 use pleiad_estimation::sample::Reading;
 use pleiad_estimation::single::{Ekf, Measurement, Process, Sensor};
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_recording::RobotRecording;
 use pleiad_report::quantity;
+use pleiad_sim_peers::scenario::{OdometryKind, RobotSettings};
 use pleiad_sim_peers::{Prior, Scenario, SimulatedRun, simulate};
 
 use crate::error::SurveyError;
@@ -192,6 +194,29 @@ pub(crate) fn root_mean_square(values: impl IntoIterator<Item = f64>) -> f64 {
         count += 1.0;
     }
     (sum / count).sqrt()
+}
+
+/// The dead reckoning of a simulated robot: the law of its simulation.
+pub(crate) fn motion(settings: &RobotSettings) -> MotionModel {
+    let noise = &settings.odometry.noise;
+    let drive = DifferentialDrive {
+        wheel_radius_m: settings.wheel_radius_m,
+        track_width_m: settings.drive.effective_track_m(settings.track_width_m),
+    };
+    MotionModel {
+        drive: (settings.odometry.kind == OdometryKind::Wheels).then_some(drive),
+        noise: MotionNoise {
+            forward_m_per_sqrt_s: noise.speed_m_per_sqrt_s,
+            lateral_m_per_sqrt_s: noise.lateral_m_per_sqrt_s,
+            yaw_rad_per_sqrt_s: noise.yaw_rad_per_sqrt_s,
+            forward_m_per_sqrt_m: noise.speed_m_per_sqrt_m,
+            yaw_rad_per_sqrt_m: 0.0,
+            yaw_rad_per_sqrt_rad: noise.yaw_rad_per_sqrt_rad,
+            quiet_at_standstill: noise.quiet_at_standstill,
+        },
+        yaw: YawSource::Odometry,
+        gyro_bias_rad_s: 0.0,
+    }
 }
 
 #[cfg(test)]

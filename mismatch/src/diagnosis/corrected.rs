@@ -30,17 +30,19 @@ fn effect(estimated: &Estimated) -> DeclaredEffect {
     DeclaredEffect { active, ci95 }
 }
 
+/// The section of a model file that applies an effect to a robot.
+pub(crate) fn section(robot: u32, declared: &DeclaredEffect) -> String {
+    let spec = EffectSpec::from(declared);
+    let parameters = toml::Value::Table(spec.parameters);
+    format!("[[robots.r{robot}.effects]]\nname = \"{}\"\nparameters = {parameters}", spec.name)
+}
+
 /// The sections of a model file that apply a finding to a robot.
 pub(crate) fn sections(robots: &[u32], found: &[Estimated]) -> String {
     let mut sections = Vec::new();
     for robot in robots {
         for estimated in found {
-            let spec = EffectSpec::from(&effect(estimated));
-            let parameters = toml::Value::Table(spec.parameters);
-            sections.push(format!(
-                "[[robots.r{robot}.effects]]\nname = \"{}\"\nparameters = {parameters}",
-                spec.name
-            ));
+            sections.push(section(*robot, &effect(estimated)));
         }
     }
     sections.join("\n\n")

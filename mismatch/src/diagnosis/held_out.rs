@@ -185,3 +185,29 @@ pub(crate) fn summed(units: &[Vec<f64>]) -> Gain {
     }
     Gain { total, standard_error: variance.max(0.0).sqrt(), consistent: false }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks that gain so much and leave so much per element, among many that nothing changes.
+    fn of(speaking: &[(f64, f64)]) -> Gain {
+        let block = |&(gain, left): &(f64, f64)| Block { gain, left: 10.0 * left, changed: 10 };
+        let quiet = std::iter::repeat_n(Block::default(), 70);
+        told(&[speaking.iter().map(block).chain(quiet).collect()])
+    }
+
+    #[test]
+    fn few_blocks_of_one_mind_are_relied_on_though_they_are_no_two_standard_errors() {
+        let gain = of(&[(54.0, 1.0), (113.0, 1.0), (117.0, 1.1)]);
+        assert!(gain.total < 2.0 * gain.standard_error && gain.is_useful(2.0));
+    }
+
+    #[test]
+    fn few_blocks_are_not_if_one_loses_or_much_is_left_or_they_are_two() {
+        assert!(!of(&[(54.0, 1.0), (113.0, 1.0), (-2.0, 1.0)]).consistent);
+        assert!(!of(&[(54.0, 1.0), (113.0, 4.0), (117.0, 1.0)]).consistent);
+        assert!(!of(&[(113.0, 1.0), (117.0, 1.0)]).consistent);
+        assert!(!of(&[(5.0, 1.0); 12]).consistent);
+    }
+}

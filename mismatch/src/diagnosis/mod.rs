@@ -33,6 +33,7 @@ mod rest;
 mod robust;
 mod rolled;
 mod run;
+mod said;
 mod scan;
 mod seldom;
 mod select;
@@ -47,6 +48,7 @@ mod white;
 mod without_truth;
 
 pub(crate) use chi_square::upper_tail;
+pub(crate) use corrected::section;
 pub use design::{Design, DesignColumn, design};
 pub use entries::composition;
 pub use explained::{Explained, Rival, Structure, explained};

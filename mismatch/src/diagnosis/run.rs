@@ -15,21 +15,22 @@ use crate::diagnosis::entries::{Entries, SHORT_S, entries, lasting_s, unseen};
 use crate::diagnosis::fit::{Fit, State, states};
 use crate::diagnosis::held_out::{Gain, compared, cross_fitted};
 use crate::diagnosis::lag::paired;
-use crate::diagnosis::naming::{Estimated, Judged, disguise, groups, judge};
+use crate::diagnosis::naming::{Judged, disguise, groups, judge};
 use crate::diagnosis::open::{Opened, open};
 use crate::diagnosis::power::undetected;
 use crate::diagnosis::rest;
-use crate::diagnosis::rolled::{self, Rolled, Roller};
+use crate::diagnosis::rolled::{self, Roller};
+use crate::diagnosis::said::{finding, nuisance};
 use crate::diagnosis::select::{Entry, Pool, Selected, select};
 use crate::diagnosis::series;
 use crate::diagnosis::spread::{self, Spread, SpreadTerm, Swaps};
 use crate::diagnosis::support::{Support, support};
-use crate::diagnosis::term::{Term, Whose};
+use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::{Member, Unit};
 use crate::diagnosis::without_truth::{Moved, again, alone_under, teams, withheld};
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
-use crate::findings::{Estimate, Finding, Findings, HeldOut, Untestable, Verdict};
+use crate::findings::{Finding, Findings, Untestable, Verdict};
 use crate::parallel;
 
 /// The spread of a uniform distribution of length one.
@@ -343,74 +344,6 @@ fn ordered(judgements: &[Judgement]) -> Vec<&Judgement> {
     let mut found: Vec<&Judgement> = judgements.iter().filter(|own| own.judged.verdict.is_some()).collect();
     found.sort_by(|a, b| b.gain.total.total_cmp(&a.gain.total));
     found
-}
-
-/// Says what was significant and is no finding.
-pub(crate) fn nuisance(term: &Term) -> String {
-    let whose = match term.whose {
-        Whose::Robot(robot) => format!("robot {robot}"),
-        Whose::Everyone => "all robots".to_owned(),
-    };
-    let each = term.parameters().iter().zip(&term.values);
-    let values: Vec<String> = each
-        .map(|(parameter, value)| format!("{} = {value:.3e} {}", parameter.label(), parameter.unit))
-        .collect();
-    format!(
-        "{whose}: {} ({}) is there, but too small to matter or of no use on data left out; it is no finding",
-        term.effect.name(),
-        values.join(", ")
-    )
-}
-
-fn finding(units: &[&Unit<'_>], rolled: &BTreeMap<RobotId, Rolled>, own: &Judgement) -> Finding {
-    let info = own.judged.estimated[0].term.effect.info();
-    let term = &own.judged.estimated[0].term;
-    let acted_on = own.support.units.iter().flat_map(|&unit| units[unit].acted_on(term));
-    let robots: BTreeSet<u32> = acted_on.map(|member| member.robot.0).collect();
-    let robots: Vec<u32> = robots.into_iter().collect();
-    let mut support_set: Vec<String> =
-        own.support.members.iter().map(|effect| effect.name().to_owned()).collect();
-    support_set.dedup();
-    support_set.extend_from_slice(&own.unnamed_rivals);
-    let verdict = own.judged.verdict.unwrap_or(Verdict::CannotTell);
-    let manoeuvre = (verdict == Verdict::CannotTell).then(|| info.broken_by.to_owned());
-    Finding {
-        verdict,
-        configuration: corrected::sections(&robots, &own.judged.estimated),
-        robots,
-        stage: info.stage.name().to_owned(),
-        channel: own.judged.channel.name().to_owned(),
-        effect: Some(info.name.to_owned()),
-        expression: None,
-        expression_units: None,
-        support_set,
-        parameters: own.parameters(),
-        place: own.judged.place.clone(),
-        p_familywise: own.judged.p_familywise.max(f64::MIN_POSITIVE),
-        held_out: HeldOut {
-            log_score_gain: own.gain.total,
-            log_score_gain_se: own.gain.standard_error,
-            rollout_rmse: rolled::of_finding(rolled, units, own),
-        },
-        shape: None,
-        manoeuvre,
-        // Sentences are the reader's: who writes the findings fills this.
-        summary: String::new(),
-        equation: Some(info.equation.to_owned()),
-    }
-}
-
-impl Judgement {
-    pub(crate) fn name(&self) -> &'static str {
-        self.judged.estimated[0].term.effect.name()
-    }
-
-    fn parameters(&self) -> BTreeMap<String, Estimate> {
-        let mut all: BTreeMap<String, Estimate> =
-            self.judged.estimated.iter().flat_map(Estimated::parameters).collect();
-        all.extend(self.judged.total.clone());
-        all
-    }
 }
 
 /// The terms of findings.

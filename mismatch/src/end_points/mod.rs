@@ -19,7 +19,7 @@ use pleiad_recording::{DeclaredEffect, Recording};
 
 use crate::channel::Channel;
 use crate::diagnose::{DiagnoseOptions, Diagnosis, TruthUse};
-use crate::diagnosis::{familywise, upper_tail};
+use crate::diagnosis::{familywise, section, upper_tail};
 use crate::end_points::path::advice;
 use crate::end_points::ways::{Case, mirror};
 use crate::error::MismatchError;
@@ -38,6 +38,8 @@ const SIGMAS: f64 = 3.0;
 const PART: f64 = 0.2;
 /// Half the width of a 95 % interval, in standard errors.
 const Z_95: f64 = 1.959_963_984_540_054;
+/// Residuals of a way: forward, left, yaw.
+const WAY: usize = 3;
 /// Iterations of Gauss and Newton; end points are nearly linear in errors of a few percent.
 const ITERATIONS: usize = 6;
 
@@ -65,14 +67,15 @@ pub(crate) fn add(
         if sparse.is_empty() || dense {
             continue;
         }
-        if let Some(findings) = of_robot(&sparse, robot)? {
+        if let Some(mut findings) = of_robot(&sparse, robot)? {
+            findings.leave(&diagnosis.findings.findings, robot);
             told(&findings, robot, diagnosis);
         }
     }
     Ok(())
 }
 
-/// The recording without sightings, gyro and the like counts as end points if its reference poses are far apart.
+/// Whether reference poses are so far apart that they are end points.
 fn is_sparse(recording: &Recording, robot: RobotId) -> bool {
     let Some(own) = recording.robots.get(&robot) else { return false };
     let [first, .., last] = own.truth.as_slice() else { return false };
@@ -91,10 +94,29 @@ struct Told {
     /// Effects that hide one another, each with the largest size that could be hidden.
     hidden: Vec<(Effect, f64)>,
     manoeuvre: String,
-    /// Of log-likelihood.
-    gain: f64,
+    /// Log score gained on ways left out, with its standard error.
+    gain: (f64, f64),
     /// The mean radius of the wheels showed as well.
     scaled: bool,
+}
+
+impl Told {
+    /// Leaves to other findings what they name: a gyro may have told the track already, and nothing is corrected twice.
+    fn leave(&mut self, found: &[Finding], robot: RobotId) {
+        let known = |effect: Effect| {
+            found.iter().any(|own| {
+                own.verdict == Verdict::Named
+                    && own.effect.as_deref() == Some(effect.name())
+                    && own.robots.contains(&robot.0)
+            })
+        };
+        self.named.retain(|(effect, ..)| !known(*effect));
+        self.hidden.retain(|(effect, _)| !known(*effect));
+        // What is known does not make up for anything.
+        if self.hidden.len() == 1 {
+            self.hidden.clear();
+        }
+    }
 }
 
 fn of_robot(recordings: &[&Recording], robot: RobotId) -> Result<Option<Told>, MismatchError> {
@@ -120,7 +142,7 @@ fn of_robot(recordings: &[&Recording], robot: RobotId) -> Result<Option<Told>, M
         both.information += Normal::new(&cases, effects, &DVector::zeros(effects.len())).information;
     }
     let manoeuvre = advice(&first.steps, both.hides().is_empty());
-    Ok(Some(Told { named: Vec::new(), p: 1.0, hidden, manoeuvre, gain: 0.0, scaled: false }))
+    Ok(Some(Told { named: Vec::new(), p: 1.0, hidden, manoeuvre, gain: (0.0, 0.0), scaled: false }))
 }
 
 /// The normal equations of all ways, errors in units of their relevance.
@@ -203,11 +225,41 @@ fn fitted(cases: &[Case<'_>], effects: &[Effect], start: &Normal<'_>) -> Option<
         (0..size).filter(relevant).map(|index| (effects[index], values[index], error(index))).collect();
     let (hidden, manoeuvre) = (Vec::new(), String::new());
     let scaled = size == ALL.len();
-    (!named.is_empty()).then_some(Told { named, p, hidden, manoeuvre, gain: 0.5 * gain, scaled })
+    let gain = left_out(cases, &end, &values, scale);
+    (!named.is_empty()).then_some(Told { named, p, hidden, manoeuvre, gain, scaled })
+}
+
+/// What is gained on each way by errors that were fitted to the others, over none: log score with its standard error.
+fn left_out(cases: &[Case<'_>], end: &Normal<'_>, values: &DVector<f64>, scale: f64) -> (f64, f64) {
+    let zero = DVector::zeros(values.len());
+    let mut gains = Vec::new();
+    for case in cases {
+        let without = case.ways(end.effects, &zero);
+        let Some((with, without)) = case.ways(end.effects, values).zip(without) else { continue };
+        let columns = with.columns * DMatrix::from_diagonal(&end.thresholds);
+        for first in (0..with.residuals.len()).step_by(WAY) {
+            let (own, residuals) = (columns.rows(first, WAY), with.residuals.rows(first, WAY));
+            // At the optimum of all ways the gradient of the others is that of this one, with the other sign.
+            let others = end.information.clone() - own.transpose() * own;
+            let Some(step) = others.cholesky().map(|others| others.solve(&(-own.transpose() * residuals)))
+            else {
+                continue;
+            };
+            let left = (residuals - own * step).norm_squared();
+            gains.push(0.5 * (without.residuals.rows(first, WAY).norm_squared() - left) / scale);
+        }
+    }
+    let count = gains.len() as f64;
+    let total: f64 = gains.iter().sum();
+    let square: f64 = gains.iter().map(|gain| (gain - total / count.max(1.0)).powi(2)).sum();
+    (total, square.sqrt())
 }
 
 /// Puts it into the diagnosis.
 fn told(own: &Told, robot: RobotId, diagnosis: &mut Diagnosis) {
+    if own.hidden.is_empty() && own.named.is_empty() {
+        return;
+    }
     let names = || own.hidden.iter().map(|(effect, _)| effect.name().to_owned()).collect::<Vec<_>>();
     let base = |effect: Effect, verdict: Verdict| Finding {
         verdict,
@@ -221,7 +273,7 @@ fn told(own: &Told, robot: RobotId, diagnosis: &mut Diagnosis) {
         parameters: BTreeMap::new(),
         place: Place::default(),
         p_familywise: own.p.max(f64::MIN_POSITIVE),
-        held_out: HeldOut { log_score_gain: own.gain, ..HeldOut::default() },
+        held_out: HeldOut { log_score_gain: own.gain.0, log_score_gain_se: own.gain.1, ..HeldOut::default() },
         shape: None,
         manoeuvre: None,
         summary: String::new(),
@@ -249,13 +301,13 @@ fn told(own: &Told, robot: RobotId, diagnosis: &mut Diagnosis) {
         let estimate = Estimate { value: *value, unit: parameter.unit.to_owned(), ci95 };
         let mut finding = base(*effect, Verdict::Named);
         finding.parameters.insert(parameter.label(), estimate);
-        diagnosis.findings.findings.push(finding);
-        let Ok(active) = ActiveEffect::new(*effect, &[*value]) else { continue };
-        for nominal in diagnosis.corrected.values_mut() {
-            if let Some(declared) = nominal.robots.get_mut(&robot) {
-                declared.effects.push(DeclaredEffect { active, ci95: vec![Some(ci95)] });
-            }
+        if let Ok(active) = ActiveEffect::new(*effect, &[*value]) {
+            let declared = DeclaredEffect { active, ci95: vec![Some(ci95)] };
+            finding.configuration = section(robot.0, &declared);
+            let own = diagnosis.corrected.values_mut().filter_map(|nominal| nominal.robots.get_mut(&robot));
+            own.for_each(|own| own.effects.push(declared.clone()));
         }
+        diagnosis.findings.findings.push(finding);
     }
     diagnosis.findings.notes.push(format!(
         "robot {robot}: reference poses are farther apart than {SPARSE_S:.0} s: its wheels and axle were judged by the way \

@@ -5,7 +5,7 @@ use pleiad_estimation::geometry::{Vector2, Vector3, wrap_angle};
 use pleiad_estimation::hypotheses::{
     Belief, KindOfLandmark, KindedMap, Localizer, MappedLandmark, Settings, Sighting, Standing,
 };
-use pleiad_estimation::motion::{DeadReckoning, MotionModel, MotionNoise, YawSource};
+use pleiad_estimation::motion::DeadReckoning;
 use pleiad_estimation::nominal::NominalTrajectory;
 use pleiad_estimation::sample::{Reading, Relative, Target};
 use pleiad_estimation::statistics::nees;
@@ -17,7 +17,7 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardUniform};
 
 use super::NAME;
-use crate::SurveyError;
+use crate::{SurveyError, solo};
 
 /// The only robot.
 pub(super) const ROBOT: RobotId = RobotId(1);
@@ -101,7 +101,7 @@ impl World {
         let diverged = |what: String| SurveyError::Diverged { study: NAME, seed, what };
         let samples = run.recording.robots.get(&ROBOT).map(|own| own.odometry.as_slice()).unwrap_or_default();
         let first = samples.first().ok_or_else(|| diverged("no odometry".into()))?.time;
-        let mut reckoning = DeadReckoning::new(motion(settings));
+        let mut reckoning = DeadReckoning::new(solo::motion(settings));
         let mut nominal = NominalTrajectory::new(first, Pose2::identity(), samples.len() + 2);
         for sample in samples {
             if let Some(step) = reckoning.odometry(*sample).map_err(|error| diverged(error.to_string()))? {
@@ -128,25 +128,6 @@ impl World {
 
     pub(super) fn truth(&self, time: Timestamp) -> Pose2 {
         self.run.tracks.get(&ROBOT).map_or(Pose2::identity(), |track| track.pose_at(time))
-    }
-}
-
-/// What dead reckoning is told of a simulated robot.
-fn motion(settings: &RobotSettings) -> MotionModel {
-    let noise = &settings.odometry.noise;
-    MotionModel {
-        drive: None,
-        noise: MotionNoise {
-            forward_m_per_sqrt_s: noise.speed_m_per_sqrt_s,
-            lateral_m_per_sqrt_s: noise.lateral_m_per_sqrt_s,
-            yaw_rad_per_sqrt_s: noise.yaw_rad_per_sqrt_s,
-            forward_m_per_sqrt_m: noise.speed_m_per_sqrt_m,
-            yaw_rad_per_sqrt_m: 0.0,
-            yaw_rad_per_sqrt_rad: noise.yaw_rad_per_sqrt_rad,
-            quiet_at_standstill: noise.quiet_at_standstill,
-        },
-        yaw: YawSource::Odometry,
-        gyro_bias_rad_s: 0.0,
     }
 }
 

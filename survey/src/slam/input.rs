@@ -3,16 +3,17 @@
 use std::collections::BTreeMap;
 
 use pleiad_estimation::fact::Noise;
-use pleiad_estimation::motion::{DifferentialDrive, MotionModel, MotionNoise, YawSource};
+use pleiad_estimation::motion::MotionModel;
 use pleiad_estimation::sample::{Reading, Relative, Sample};
 use pleiad_estimation::strategy::Noises;
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use pleiad_recording::RobotRecording;
-use pleiad_sim_peers::scenario::{OdometryKind, RobotSettings};
+use pleiad_sim_peers::scenario::RobotSettings;
 use pleiad_sim_peers::{Scenario, simulate};
 
 use crate::error::SurveyError;
+use crate::solo;
 
 /// One robot's samples, and what it is told.
 #[derive(Clone, Debug)]
@@ -74,7 +75,7 @@ impl SlamInput {
         let told = settings.prior;
         Ok(Self {
             robot,
-            motion: motion(settings),
+            motion: solo::motion(settings),
             noises: noises(settings),
             start: prior.pose,
             start_noise: Symmetric3::diagonal(
@@ -125,29 +126,6 @@ fn without_chance(settings: &mut RobotSettings) {
     settings.relative.sigma_range_m = NEXT_TO_NOTHING;
     settings.relative.sigma_bearing_rad = NEXT_TO_NOTHING;
     settings.relative.sigma_position_m = NEXT_TO_NOTHING;
-}
-
-/// The dead reckoning of a simulated robot: the law of its simulation.
-fn motion(settings: &RobotSettings) -> MotionModel {
-    let noise = &settings.odometry.noise;
-    let drive = DifferentialDrive {
-        wheel_radius_m: settings.wheel_radius_m,
-        track_width_m: settings.drive.effective_track_m(settings.track_width_m),
-    };
-    MotionModel {
-        drive: (settings.odometry.kind == OdometryKind::Wheels).then_some(drive),
-        noise: MotionNoise {
-            forward_m_per_sqrt_s: noise.speed_m_per_sqrt_s,
-            lateral_m_per_sqrt_s: noise.lateral_m_per_sqrt_s,
-            yaw_rad_per_sqrt_s: noise.yaw_rad_per_sqrt_s,
-            forward_m_per_sqrt_m: noise.speed_m_per_sqrt_m,
-            yaw_rad_per_sqrt_m: 0.0,
-            yaw_rad_per_sqrt_rad: noise.yaw_rad_per_sqrt_rad,
-            quiet_at_standstill: noise.quiet_at_standstill,
-        },
-        yaw: YawSource::Odometry,
-        gyro_bias_rad_s: 0.0,
-    }
 }
 
 fn noises(settings: &RobotSettings) -> Noises {

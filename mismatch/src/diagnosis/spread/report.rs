@@ -48,7 +48,7 @@ impl Spread {
     /// What is there and no finding.
     pub(crate) fn nuisances(&self) -> Vec<String> {
         let nuisances = self.terms.iter().filter(|own| own.judged.verdict.is_none());
-        nuisances.map(|own| crate::diagnosis::run::nuisance(&own.judged.estimated[0].term)).collect()
+        nuisances.map(|own| crate::diagnosis::said::nuisance(&own.judged.estimated[0].term)).collect()
     }
 }
 
