@@ -229,11 +229,13 @@ fn fitted(cases: &[Case<'_>], effects: &[Effect], start: &Normal<'_>) -> Option<
     (!named.is_empty()).then_some(Told { named, p, hidden, manoeuvre, gain, scaled })
 }
 
-/// What is gained on each way by errors that were fitted to the others, over none: log score with its standard error.
+/// What is gained on each way by errors that were fitted to the others, over none: log score with its
+/// standard error. Ways of one recording are alike; of two, one may be the way round that hides what the other shows.
 fn left_out(cases: &[Case<'_>], end: &Normal<'_>, values: &DVector<f64>, scale: f64) -> (f64, f64) {
     let zero = DVector::zeros(values.len());
-    let mut gains = Vec::new();
+    let (mut total, mut variance) = (0.0, 0.0);
     for case in cases {
+        let mut gains = Vec::new();
         let without = case.ways(end.effects, &zero);
         let Some((with, without)) = case.ways(end.effects, values).zip(without) else { continue };
         let columns = with.columns * DMatrix::from_diagonal(&end.thresholds);
@@ -248,11 +250,11 @@ fn left_out(cases: &[Case<'_>], end: &Normal<'_>, values: &DVector<f64>, scale: 
             let left = (residuals - own * step).norm_squared();
             gains.push(0.5 * (without.residuals.rows(first, WAY).norm_squared() - left) / scale);
         }
+        let mean = gains.iter().sum::<f64>() / gains.len().max(1) as f64;
+        total += gains.iter().sum::<f64>();
+        variance += gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>();
     }
-    let count = gains.len() as f64;
-    let total: f64 = gains.iter().sum();
-    let square: f64 = gains.iter().map(|gain| (gain - total / count.max(1.0)).powi(2)).sum();
-    (total, square.sqrt())
+    (total, variance.sqrt())
 }
 
 /// Puts it into the diagnosis.
