@@ -203,9 +203,10 @@ impl Node {
             self.membership.disagrees = true;
             self.notice(Notice::SnapshotDisagreement { peer, cut, theirs: hash, ours });
         }
+        // What it has said to have ended is over, though a peer that has given it up may not have taken that in.
         let own = status.logs.iter().filter(|log| log.log.robot == self.config.robot);
         let more = own.filter(|log| {
-            self.ledger.log(log.log).map_or(0, Log::held) < log.held && !self.ledger.is_forgotten(log.log)
+            self.ledger.log(log.log).map_or(0, Log::held) < log.held && !self.ledger.is_complete(log.log)
         });
         let later = theirs.cut.is_some_and(|(cut, _)| self.ledger.cut().is_none_or(|ours| cut > ours));
         let forgotten = theirs.firsts.iter().any(|(log, first)| {

@@ -171,6 +171,21 @@ impl Ledger {
                     raise(id, held);
                     limits.insert(id, held);
                 }
+                // An earlier cut may have counted what his accepted seals say of logs that are not accepted.
+                let seals = closing.seals.get(&term.robot).into_iter().flatten();
+                let accepted = |id: &EntryId| {
+                    id.boot >= term.boot
+                        && length_of(&term.limits, id.log()).is_some_and(|held| id.sequence.0 < held)
+                };
+                for (id, seal) in seals.filter(|(id, _)| accepted(id)) {
+                    for log in seal.logs.iter().filter(|log| log.last) {
+                        let of = LogId { robot: id.robot, boot: log.boot };
+                        if length_of(&term.limits, of).is_none() && !forgotten(of) {
+                            raise(of, 0);
+                            limits.insert(of, 0);
+                        }
+                    }
+                }
                 continue;
             }
             let accounted = base.seals.get(&term.robot).filter(|(id, _)| id.boot >= term.boot);
@@ -182,8 +197,7 @@ impl Ledger {
             for (id, seal) in seals.filter(|(id, _)| id.boot >= term.boot) {
                 let said = |log: &SealedLog| {
                     let of = LogId { robot: id.robot, boot: log.boot };
-                    let ends = self.logs.get(&of).and_then(|log| log.limit);
-                    (of, rules::needed(log.length, ends))
+                    (of, rules::needed(log.length, self.end_of(closing, of)))
                 };
                 for (of, length) in seal.logs.iter().filter(|log| log.last).map(said) {
                     if !forgotten(of) {

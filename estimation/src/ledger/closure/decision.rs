@@ -20,9 +20,10 @@ impl Ledger {
         let Some(term) = closing.views.active().find(|term| term.robot == robot) else {
             return Timestamp::MIN;
         };
-        let ends = |log: LogId| match length_of(&vote.held, log) {
-            Some(WHOLE) => self.logs.get(&log).and_then(|log| log.limit),
-            held => held,
+        // Nothing is accepted of a log that nobody who stays has heard of.
+        let ends = |log: LogId| match length_of(&vote.held, log).unwrap_or(0) {
+            WHOLE => self.logs.get(&log).and_then(|log| log.limit),
+            held => Some(held),
         };
         let seals = closing.seals.get(&robot).into_iter().flatten().filter(|(id, _)| accepts(vote, **id));
         let later: Vec<(&EntryId, &Seal)> = whole(seals, ends).collect();
@@ -33,9 +34,13 @@ impl Ledger {
         until.max(term.from)
     }
 
-    /// Ends the logs that a seal says have ended; not on the word of one who is given up.
+    /// Ends the logs that a seal says have ended; not on the word of one who is given up, nor on one that is not
+    /// accepted of who goes.
     fn end_logs(&mut self, id: EntryId, seal: &Seal) {
         let Some(closing) = &self.closing else { return };
+        if closing.views.decided().is_some_and(|vote| vote.removed.contains(&id.robot) && !accepts(vote, id)) {
+            return;
+        }
         let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
         if !given_up.into_iter().all(|vote| accepts(vote, id)) {
             return;
@@ -54,15 +59,35 @@ impl Ledger {
         }
     }
 
+    /// What is accepted of a log of one who goes reaches as far as his accepted seals let it, whatever those said
+    /// that are not accepted.
+    fn reopen_accepted(&mut self, vote: &Vote) {
+        let Some(closing) = &self.closing else { return };
+        let (base, seals) = (&closing.base, &closing.seals);
+        let reopened = self.logs.iter_mut().filter(|(id, _)| vote.removed.contains(&id.robot));
+        for (id, log) in reopened {
+            let (Some(known), Some(held)) = (log.limit, length_of(&vote.held, *id)) else { continue };
+            let accepted = seals.get(&id.robot).into_iter().flatten().filter(|(seal, _)| accepts(vote, **seal));
+            let named = accepted.flat_map(|(_, seal)| &seal.logs);
+            let said = named.filter(|named| named.last && named.boot == id.boot).map(|named| named.length);
+            let earlier = base.logs.get(id).and_then(|log| log.limit);
+            let ends = said.chain(earlier).chain((held != WHOLE).then_some(held)).min();
+            if ends.is_none_or(|ends| ends > known) {
+                log.limit = ends;
+            }
+        }
+    }
+
     /// Puts membership changes into effect that everyone who stays has voted for.
     pub(in crate::ledger) fn decide(&mut self) {
         loop {
             let Some(closing) = &self.closing else { return };
-            let Some(vote) = closing.views.decided() else { return };
+            let Some(vote) = closing.views.decided().cloned() else { return };
+            self.reopen_accepted(&vote);
             if !vote.held.iter().all(|(log, held)| self.holds_accepted(*log, *held)) {
                 return;
             }
-            let vote = vote.clone();
+            let Some(closing) = &self.closing else { return };
             let reach = |robot: &RobotId| self.sealed_within(closing, *robot, &vote);
             let until: Vec<Timestamp> = vote.removed.iter().map(reach).collect();
             let gone: Vec<LogId> =

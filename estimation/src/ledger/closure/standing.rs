@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::Closing;
-use crate::fact::{EntryId, LogId, Seal, Vote, length_of};
+use crate::fact::{EntryId, LogId, Seal, Vote, WHOLE, length_of};
 use crate::ledger::Ledger;
 use crate::ledger::rules::{self, Standing};
 use crate::ledger::views::Term;
@@ -18,10 +18,10 @@ impl Ledger {
     /// Whether a seal counts: everything it speaks of is held, and nothing speaks against its author.
     fn counts_here(&self, closing: &Closing, id: EntryId, seal: &Seal) -> bool {
         let of = |boot| LogId { robot: id.robot, boot };
-        let mut needed = seal.logs.iter().map(|log| {
-            let ends = self.logs.get(&of(log.boot)).and_then(|log| log.limit);
-            (of(log.boot), rules::needed(log.length, ends))
-        });
+        let mut needed = seal
+            .logs
+            .iter()
+            .map(|log| (of(log.boot), rules::needed(log.length, self.end_of(closing, of(log.boot)))));
         // Whoever has given a robot up relies on nothing of its that it has not said it held then.
         let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
         let reported = |log: LogId, length: u64| {
@@ -36,9 +36,20 @@ impl Ledger {
     pub(super) fn holds_past(&self, closing: &Closing, robot: RobotId) -> bool {
         let named = closing.seals.get(&robot).into_iter().flatten().flat_map(|(_, seal)| &seal.logs);
         let mut named = named.map(|log| (LogId { robot, boot: log.boot }, log.length));
-        named.all(|(id, length)| {
-            self.holds(id, rules::needed(length, self.logs.get(&id).and_then(|log| log.limit)))
-        })
+        named.all(|(id, length)| self.holds(id, rules::needed(length, self.end_of(closing, id))))
+    }
+
+    /// Where a log ends, if it does: where its author has said so, and of who has gone, where what is accepted
+    /// of it ends. Nothing is accepted of a log that nobody who stayed has heard of.
+    pub(super) fn end_of(&self, closing: &Closing, log: LogId) -> Option<u64> {
+        let said = self.logs.get(&log).and_then(|log| log.limit);
+        let stays =
+            closing.views.terms.iter().filter(|term| term.robot == log.robot && term.boot <= log.boot);
+        let gone = stays.max_by_key(|term| (term.boot, term.from)).filter(|term| term.until.is_some());
+        match gone.map(|term| length_of(&term.limits, log).unwrap_or(0)) {
+            Some(accepted) if accepted != WHOLE => Some(rules::needed(accepted, said)),
+            _ => said,
+        }
     }
 
     /// A robot's seals after the base that promise something. One that rests on entries lost before anyone
@@ -49,9 +60,8 @@ impl Ledger {
         closing: &'a Closing,
         robot: RobotId,
     ) -> impl Iterator<Item = (&'a EntryId, &'a Seal)> {
-        let ends = move |log: LogId| self.logs.get(&log).and_then(|held| held.limit);
         whole(closing.seals.get(&robot).into_iter().flatten(), move |log| {
-            if self.is_forgotten(log) { None } else { ends(log) }
+            if self.is_forgotten(log) { None } else { self.end_of(closing, log) }
         })
     }
 
