@@ -79,7 +79,11 @@ impl Approximate {
                 Record::Said(from, message) => {
                     let _ = recovered.peer.handle(strategy::Event::Received { from, message });
                 }
-                Record::Entry(_) | Record::Tick { .. } | Record::Closed(_) | Record::Checkpoint(_) => {}
+                Record::Entry(_)
+                | Record::Tick { .. }
+                | Record::Closed(_)
+                | Record::Checkpoint(_)
+                | Record::Earlier(_) => {}
             }
         }
         Some(recovered)

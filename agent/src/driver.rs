@@ -177,7 +177,13 @@ fn check_records(
 ) -> Result<(), DriverError> {
     let exact = config.strategy == StrategyKind::Exact;
     let found = records.iter().find_map(|record| match record {
-        Record::Entry(_) | Record::Tick { .. } | Record::Closed(_) | Record::Checkpoint(_) if !exact => {
+        Record::Entry(_)
+        | Record::Tick { .. }
+        | Record::Closed(_)
+        | Record::Checkpoint(_)
+        | Record::Earlier(_)
+            if !exact =>
+        {
             Some("exact")
         }
         Record::Said(..) if exact => Some("pairwise, intersection, split_intersection or naive"),

@@ -218,9 +218,11 @@ pub fn frame(records: &[Record]) -> Vec<u8> {
         let message = match record {
             Record::Sample(sample) => encode_sample(sample),
             Record::Entry(entry) => encode_entries(std::slice::from_ref(entry)),
-            Record::Tick { .. } | Record::Closed(_) | Record::Checkpoint(_) | Record::Said(..) => {
-                kept::encode(record)
-            }
+            Record::Tick { .. }
+            | Record::Closed(_)
+            | Record::Checkpoint(_)
+            | Record::Earlier(_)
+            | Record::Said(..) => kept::encode(record),
         };
         frame.extend_from_slice(&length(message.len()));
         frame.extend_from_slice(&message);

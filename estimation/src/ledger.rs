@@ -23,7 +23,7 @@ use closure::Closing;
 pub use closure::Wish;
 pub use counts::FactCounts;
 pub use history::SettledPoint;
-pub use log::{Log, LogDigest};
+pub use log::{EarlierEntries, Log, LogDigest};
 #[cfg(feature = "planted")]
 pub use planted::Planted;
 pub use rules::Closure;

@@ -1,10 +1,13 @@
 //! Records that only a journal holds: what never travels. A byte that begins no message, one that says which,
 //! then numbers in little-endian order.
 
-use pleiad_estimation::fact::NominalState;
+use pleiad_estimation::fact::{Fingerprint, LogId, NominalState};
+use pleiad_estimation::ledger::EarlierEntries;
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
-use pleiad_protocol::{Message, ProtocolError, decode_checkpoint, encode_checkpoint};
+use pleiad_protocol::{
+    Message, ProtocolError, decode_checkpoint, decode_entries, encode_checkpoint, encode_entries,
+};
 
 use crate::node::Record;
 
@@ -14,6 +17,7 @@ const TICK: u8 = 1;
 const CLOSED: u8 = 2;
 const CHECKPOINT: u8 = 3;
 const SAID: u8 = 4;
+const EARLIER: u8 = 5;
 
 pub(super) fn is_kept(bytes: &[u8]) -> bool {
     bytes.first() == Some(&KEPT)
@@ -40,6 +44,13 @@ pub(super) fn encode(record: &Record) -> Vec<u8> {
         Record::Checkpoint(checkpoint) => {
             bytes.push(CHECKPOINT);
             bytes.extend(encode_checkpoint(checkpoint));
+        }
+        Record::Earlier(earlier) => {
+            bytes.push(EARLIER);
+            bytes.extend(earlier.log.robot.0.to_le_bytes());
+            bytes.extend(earlier.log.boot.0.to_le_bytes());
+            bytes.extend(earlier.chain.0);
+            bytes.extend(encode_entries(&earlier.entries));
         }
         Record::Said(from, message) => {
             bytes.push(SAID);
@@ -97,6 +108,13 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Record, ProtocolError> {
                 Message::Strategy(message) => Record::Said(from, message),
                 other => return Err(ProtocolError::OtherKind { found: other.kind(), expected: "strategy" }),
             }
+        }
+        EARLIER => {
+            let robot = RobotId(u32::from_le_bytes(numbers.take()?));
+            let boot = BootIndex(u32::from_le_bytes(numbers.take()?));
+            let chain = Fingerprint(numbers.take()?);
+            let entries = decode_entries(numbers.0)?;
+            Record::Earlier(EarlierEntries { log: LogId { robot, boot }, chain, entries })
         }
         found => return Err(ProtocolError::Kind { found }),
     })

@@ -310,6 +310,7 @@ impl Node {
             records.extend(empty.base().map(|base| Record::Checkpoint(Box::new(base.clone()))));
         }
         records.extend(self.base_record());
+        records.extend(self.ledger.earlier_entries().map(Record::Earlier));
         records.extend(self.ledger.entries_after_cut().cloned().map(Record::Entry));
         for segment in self.segments.iter() {
             let (boot, odom) = (segment.boot, segment.odom);

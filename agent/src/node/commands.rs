@@ -1,7 +1,7 @@
 //! What goes into a node and what comes out.
 
 use pleiad_estimation::fact::{Entry, EntryId, Fingerprint, LogId, NominalState};
-use pleiad_estimation::ledger::{Checkpoint, Refusal};
+use pleiad_estimation::ledger::{Checkpoint, EarlierEntries, Refusal};
 use pleiad_estimation::sample::{Sample, SampleRefusal};
 use pleiad_estimation::strategy;
 use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
@@ -99,6 +99,8 @@ pub enum Record {
     Closed(Timestamp),
     /// A snapshot, of this robot or taken over from a peer: what came before is in it.
     Checkpoint(Box<Checkpoint>),
+    /// Entries that the snapshot before accounts for, kept for peers that have not come as far.
+    Earlier(EarlierEntries),
     /// What a peer said, of an approximate strategy.
     Said(RobotId, strategy::Message),
 }

@@ -49,6 +49,7 @@ impl Node {
                     }
                 }
                 Record::Checkpoint(checkpoint) => node.resume(*checkpoint),
+                Record::Earlier(earlier) => node.ledger.keep_earlier(earlier),
                 // Of an approximate strategy.
                 Record::Said(..) => {}
                 Record::Sample(sample) => {

@@ -11,7 +11,7 @@ use super::checkpoint::Checkpoint;
 use super::counts::FactCounts;
 use super::rules::{self, Closure};
 use super::views::{Term, Views};
-use super::{Ledger, Log};
+use super::{EarlierEntries, Ledger, Log};
 use crate::fact::{Entry, EntryId, Fingerprint, LogId, Seal, Vote, WHOLE};
 use crate::fold::FoldConfig;
 use crate::joint::Joint;
@@ -142,6 +142,11 @@ impl Ledger {
         let Some(closing) = &self.closing else { return false };
         let (closure, owner) = (closing.closure.clone(), closing.owner);
         let mut fresh = Self::from_checkpoint(self.config, closure, owner, checkpoint);
+        let bases: Vec<(LogId, u64)> = fresh.logs.iter().map(|(id, log)| (*id, log.base)).collect();
+        for (id, base) in bases {
+            let held = self.logs.get(&id).into_iter();
+            held.flat_map(|log| log.earlier(id, base)).for_each(|earlier| fresh.keep_earlier(earlier));
+        }
         for entry in self.by_stay().into_iter().flat_map(|(_, log)| log.all()) {
             fresh.insert(entry.clone());
         }
@@ -257,6 +262,18 @@ impl Ledger {
     pub fn entries_after_cut(&self) -> impl Iterator<Item = &Entry> {
         let after = |log: &Log, entry: &Entry| entry.id.sequence.0 >= log.base;
         self.by_stay().into_iter().flat_map(move |(_, log)| log.all().filter(move |entry| after(log, entry)))
+    }
+
+    /// What the last cut has accounted for and some member may still ask for, of each log the latest piece first.
+    pub fn earlier_entries(&self) -> impl Iterator<Item = EarlierEntries> + '_ {
+        self.logs.iter().flat_map(|(id, log)| log.earlier(*id, log.base))
+    }
+
+    /// Keeps for peers what the snapshot it rests on accounts for. Entries that are not those are ignored.
+    pub fn keep_earlier(&mut self, earlier: EarlierEntries) {
+        if let Some(log) = self.logs.get_mut(&earlier.log) {
+            log.keep_earlier(earlier);
+        }
     }
 
     /// The logs in an order in which they can be taken: those of who came later after the votes that admitted

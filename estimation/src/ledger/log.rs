@@ -8,6 +8,8 @@ use crate::fact::{Entry, Fingerprint, LogId};
 
 /// Entries that may wait beyond the first missing one.
 const MOST_WAITING: usize = 4096;
+/// Earlier entries that are handed on together.
+const PIECE: usize = 256;
 
 /// A contiguous prefix of one robot's entries during one boot. What a cut has accounted for may be
 /// forgotten from its front.
@@ -41,6 +43,17 @@ pub struct LogDigest {
     pub first: u64,
     /// Entries that wait for a missing one.
     pub waiting: usize,
+}
+
+/// Entries of a log that are accounted for, and kept for peers that have not come as far.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EarlierEntries {
+    /// Which log.
+    pub log: LogId,
+    /// Chain over what came before them.
+    pub chain: Fingerprint,
+    /// Without a gap, up to where the last cut stands in this log.
+    pub entries: Vec<Entry>,
 }
 
 impl Log {
@@ -167,6 +180,30 @@ impl Log {
             limit: self.limit,
             base: self.base,
             waiting: BTreeMap::new(),
+        }
+    }
+
+    /// What is kept of the entries before sequence `until`, in pieces, the latest first.
+    pub(super) fn earlier(&self, log: LogId, until: u64) -> impl Iterator<Item = EarlierEntries> + '_ {
+        let count = until.checked_sub(self.first).and_then(|count| usize::try_from(count).ok());
+        let entries = count.and_then(|count| self.entries.get(..count)).unwrap_or(&[]);
+        entries.rchunks(PIECE).filter_map(move |piece| {
+            let first = piece.first()?.id.sequence.0;
+            Some(EarlierEntries { log, chain: self.chain_before(first), entries: piece.to_vec() })
+        })
+    }
+
+    /// Keeps entries before those kept so far; not if they are others than those accounted for.
+    pub(super) fn keep_earlier(&mut self, earlier: EarlierEntries) {
+        let EarlierEntries { chain: first_chain, entries, .. } = earlier;
+        let fingerprints: Vec<Fingerprint> = entries.iter().map(Fingerprint::of).collect();
+        let chain = fingerprints.iter().fold(first_chain, |chain, print| chain.chained(*print));
+        let adjoin = entries.last().is_some_and(|last| last.id.sequence.0 + 1 == self.first);
+        if adjoin && chain == self.first_chain {
+            self.first -= entries.len() as u64;
+            self.first_chain = first_chain;
+            self.entries.splice(..0, entries);
+            self.fingerprints.splice(..0, fingerprints);
         }
     }
 

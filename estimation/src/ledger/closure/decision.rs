@@ -38,7 +38,8 @@ impl Ledger {
     /// accepted of who goes.
     fn end_logs(&mut self, id: EntryId, seal: &Seal) {
         let Some(closing) = &self.closing else { return };
-        if closing.views.decided().is_some_and(|vote| vote.removed.contains(&id.robot) && !accepts(vote, id)) {
+        if closing.views.decided().is_some_and(|vote| vote.removed.contains(&id.robot) && !accepts(vote, id))
+        {
             return;
         }
         let given_up = closing.views.promises(closing.owner).filter(|vote| vote.removed.contains(&id.robot));
@@ -67,13 +68,15 @@ impl Ledger {
         let reopened = self.logs.iter_mut().filter(|(id, _)| vote.removed.contains(&id.robot));
         for (id, log) in reopened {
             let (Some(known), Some(held)) = (log.limit, length_of(&vote.held, *id)) else { continue };
-            let accepted = seals.get(&id.robot).into_iter().flatten().filter(|(seal, _)| accepts(vote, **seal));
+            let accepted =
+                seals.get(&id.robot).into_iter().flatten().filter(|(seal, _)| accepts(vote, **seal));
             let named = accepted.flat_map(|(_, seal)| &seal.logs);
             let said = named.filter(|named| named.last && named.boot == id.boot).map(|named| named.length);
             let earlier = base.logs.get(id).and_then(|log| log.limit);
-            let ends = said.chain(earlier).chain((held != WHOLE).then_some(held)).min();
-            if ends.is_none_or(|ends| ends > known) {
-                log.limit = ends;
+            // What somebody has forgotten, being whole, has ended where its author said.
+            let ends = said.chain(earlier).fold(held, u64::min);
+            if held != WHOLE && ends > known {
+                log.limit = Some(ends);
             }
         }
     }
