@@ -195,7 +195,9 @@ mod tests {
         // A correlation of -0.4.
         let own = Correlation::new(plain(-0.5), &chain);
         let (errors, column) = ([0.3, -1.2, 0.8, 2.0, -0.1], [1.0, 0.5, -2.0, 0.25, 3.0]);
-        assert!((product(&own.freed(&errors), &own.gathered(&column)) - product(&errors, &column)).abs() < 1e-12);
+        assert!(
+            (product(&own.freed(&errors), &own.gathered(&column)) - product(&errors, &column)).abs() < 1e-12
+        );
         // The variance of a product with a column: a' R a with the correlations written out.
         let pairs: f64 = (0..4).map(|t| 2.0 * -0.4 * chain.links[t] * column[t] * column[t + 1]).sum();
         assert!((variance(&own, &column) - (product(&column, &column) + pairs)).abs() < 1e-12);
@@ -230,7 +232,9 @@ mod tests {
         }
         assert!((variance(&own, &column) - expected).abs() < 1e-12);
         let errors = [0.3, -1.2, 0.8, 2.0, -0.1];
-        assert!((product(&own.freed(&errors), &own.gathered(&column)) - product(&errors, &column)).abs() < 1e-12);
+        assert!(
+            (product(&own.freed(&errors), &own.gathered(&column)) - product(&errors, &column)).abs() < 1e-12
+        );
     }
 
     #[test]

@@ -144,8 +144,7 @@ impl Opened {
                 .filter(|own| own.claims())
                 .filter(|own| own.support.units.iter().all(|&unit| units[unit].robot() == robot))
                 .collect();
-            let effects: Vec<Effect> =
-                names.iter().map(|own| own.judged.estimated[0].term.effect).collect();
+            let effects: Vec<Effect> = names.iter().map(|own| own.judged.estimated[0].term.effect).collect();
             let channels = found.iter().flat_map(|own| own.target.channels()).map(|(channel, _)| *channel);
             for position in makeshifts(&effects, channels.collect()) {
                 names[position].doubt(rivals.iter().cloned());
@@ -195,14 +194,15 @@ impl Opened {
     }
 }
 
-/// The positions of effects that touch one of these channels, or a channel of another that does.
+/// The positions of effects that touch one of these channels, or a channel of another that does. Where two do, all: one
+/// thing moves the whole robot, as a marker of the truth beside its middle, and each name takes up a part of it.
 fn makeshifts(effects: &[Effect], mut channels: BTreeSet<Channel>) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     loop {
         let shows = |position: &usize| channels.iter().any(|&channel| touches(effects[*position], channel));
         let more: Vec<usize> = (0..effects.len()).filter(|own| !found.contains(own)).filter(shows).collect();
         if more.is_empty() {
-            return found;
+            return if found.len() > 1 { (0..effects.len()).collect() } else { found };
         }
         for position in more {
             channels.extend(Channel::ALL.into_iter().filter(|&channel| touches(effects[position], channel)));
@@ -310,4 +310,29 @@ pub(crate) fn built<'u, 'a>(base: &Picture<'u, 'a>, curves: &[Curve], forms: &[F
     let mut columns: Vec<_> = curves.iter().flat_map(Curve::all_columns).collect();
     columns.extend(forms.iter().map(|form| form.columns.clone()));
     if columns.is_empty() { base.clone() } else { base.with(&columns) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(effects: &[Effect], channels: &[Channel]) -> Vec<usize> {
+        makeshifts(effects, channels.iter().copied().collect()).into_iter().collect()
+    }
+
+    #[test]
+    fn a_name_in_a_channel_with_something_unnamed_is_doubted_and_one_elsewhere_is_not() {
+        let names = [Effect::IcrOffset, Effect::SensorYawMisalignment];
+        assert_eq!(found(&names, &[Channel::Body]), [0]);
+        assert_eq!(found(&names, &[Channel::BearingToLandmark]), [1]);
+        assert_eq!(found(&names, &[Channel::Gps]), Vec::<usize>::new());
+        assert_eq!(found(&names, &[]), Vec::<usize>::new());
+    }
+
+    #[test]
+    fn where_two_names_are_doubted_all_of_the_robot_are() {
+        // What a marker of the truth beside the middle of a robot is taken for.
+        let names = [Effect::SensorLeverArm, Effect::IcrOffset, Effect::Crab, Effect::GpsLeverArm];
+        assert_eq!(found(&names, &[Channel::Body]), [0, 1, 2, 3]);
+    }
 }

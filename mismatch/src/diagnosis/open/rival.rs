@@ -164,12 +164,10 @@ pub(crate) fn places(units: &[&Unit<'_>], full: &Fit, robot: RobotId) -> Vec<usi
 /// The terms of a robot that share a channel with another of its own: several may together imitate what one form
 /// describes, and leave nothing in which a form would show.
 pub(crate) fn joint(terms: &[Term], robot: RobotId) -> Vec<usize> {
-    let own: Vec<usize> =
-        (0..terms.len()).filter(|&term| terms[term].whose == Whose::Robot(robot)).collect();
+    let own: Vec<usize> = (0..terms.len()).filter(|&term| terms[term].whose == Whose::Robot(robot)).collect();
     let share = |a: usize, b: usize| {
-        let both = |channel: &Channel| {
-            touches(terms[a].effect, *channel) && touches(terms[b].effect, *channel)
-        };
+        let both =
+            |channel: &Channel| touches(terms[a].effect, *channel) && touches(terms[b].effect, *channel);
         Channel::ALL.iter().any(both)
     };
     own.iter().copied().filter(|&a| own.iter().any(|&b| a != b && share(a, b))).collect()
@@ -273,4 +271,25 @@ fn needed(
     }
     let forms = forms.into_iter().map(|form| found.forms[form].clone()).collect();
     Needed { terms, forms, curves: found.curves.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_one_robot_that_share_a_channel_are_held_against_a_form() {
+        let of = |effect: Effect, robot: u32| {
+            let off = effect.info().parameters.iter().map(|parameter| parameter.off).collect();
+            Term::new(effect, Whose::Robot(RobotId(robot)), off)
+        };
+        let terms = [
+            of(Effect::WheelRadiusError, 1),
+            of(Effect::SensorYawMisalignment, 1),
+            of(Effect::TrackWidthError, 1),
+            of(Effect::WheelRadiusError, 2),
+        ];
+        assert_eq!(joint(&terms, RobotId(1)), [0, 2]);
+        assert_eq!(joint(&terms, RobotId(2)), Vec::<usize>::new());
+    }
 }

@@ -80,7 +80,8 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     let mut ranks = vec![0.0; values.len()];
     let mut first = 0;
     while first < order.len() {
-        let same = order[first..].iter().take_while(|&&own| values[own] <= values[order[first]]).count().max(1);
+        let same =
+            order[first..].iter().take_while(|&&own| values[own] <= values[order[first]]).count().max(1);
         let rank = (first as f64 + 0.5 * (same - 1) as f64) / last;
         for &own in &order[first..first + same] {
             ranks[own] = rank;

@@ -21,8 +21,8 @@ use pleiad_physics::{Context, Effect, Motion, Pose, RobotModel};
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::naming::NEAR_END;
-use crate::diagnosis::spread::Explained;
 use crate::diagnosis::noise;
+use crate::diagnosis::spread::Explained;
 use crate::diagnosis::spread::check::Check;
 use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Family, Member, Place, Shown, Shows, blocks};
@@ -124,8 +124,7 @@ impl Density for Windows {
             let (mut times, mut sizes) = (Vec::new(), Vec::new());
             for (row, &block) in self.rows.iter().zip(&self.blocks) {
                 let jitter = (parameters[JITTER] + row.declared_jitter_s.powi(2)) / 12.0;
-                let sigma =
-                    (libm::exp(2.0 * parameters[NOISE + part]) + jitter * row.agitation[part]).sqrt();
+                let sigma = (libm::exp(2.0 * parameters[NOISE + part]) + jitter * row.agitation[part]).sqrt();
                 let z = (row.residual[part] - parameters[DELAY] * row.delayed[part]) / sigma;
                 // Where no command changes anything a delay does not show.
                 if row.agitation[part].sqrt() * MATTERS_S < sigma {

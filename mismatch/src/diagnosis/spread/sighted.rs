@@ -177,9 +177,8 @@ impl Sightings {
         let student = Student::new(parameters[TAILS]);
         let bases = [0, 1].map(|kind| [0, 1].map(|part| libm::exp(parameters[BASE + 2 * kind + part])));
         let own = || self.rows.iter().zip(&self.blocks).filter(|(row, _)| row.kind == kind);
-        let z = |row: &Row, part: usize| {
-            Some(row.errors[part]? / Self::sigmas(row, &bases, parameters)[part])
-        };
+        let z =
+            |row: &Row, part: usize| Some(row.errors[part]? / Self::sigmas(row, &bases, parameters)[part]);
         let mut all = Vec::new();
         for part in 0..2 {
             let rows: Vec<(&Row, usize, f64)> =
