@@ -275,6 +275,8 @@ fn needed(
 
 #[cfg(test)]
 mod tests {
+    use pleiad_physics::Effect;
+
     use super::*;
 
     #[test]
