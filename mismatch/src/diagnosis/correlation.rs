@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn slip_that_lasts_two_windows_is_seen_to() {
         // e = z + w / 2 in 180 windows; of their sum the variance is that of z times (1 + f) / (1 - f), and that of w.
-        let (count, f) = (180, libm::exp(-0.5));
+        let (count, f) = (180_usize, libm::exp(-0.5));
         let mut all = Vec::new();
         for seed in 0..40 {
             let mut normal = Normal(1000 + seed);
@@ -267,10 +267,12 @@ mod tests {
                 errors.push(z + 0.5 * normal.draw());
                 z = f * z + (1.0 - f * f).sqrt() * normal.draw();
             }
-            let scale = (product(&errors, &errors) / f64::from(count)).sqrt();
-            errors.iter_mut().for_each(|error| *error /= scale);
-            let (_, own) = Correlation::likeliest(&errors, &even(count as usize)).unwrap();
-            all.push(variance(&own, &vec![1.0; count as usize]) / f64::from(count));
+            let scale = (product(&errors, &errors) / count as f64).sqrt();
+            for error in &mut errors {
+                *error /= scale;
+            }
+            let (_, own) = Correlation::likeliest(&errors, &even(count)).unwrap();
+            all.push(variance(&own, &vec![1.0; count]) / count as f64);
         }
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         let expected = ((1.0 + f) / (1.0 - f) + 0.25) / 1.25;
