@@ -16,7 +16,7 @@ use crate::diagnosis::select::FAMILYWISE;
 /// log-densities, as by a third of the variance.
 const LEAST_DIFFERENCE: f64 = 0.15;
 /// The same for one target against the others.
-const LEAST_OF_TARGET: f64 = 0.3;
+pub(super) const LEAST_OF_TARGET: f64 = 0.3;
 /// Fewer rows of a target than this say nothing.
 const LEAST_ROWS: usize = 20;
 /// The fewest blocks that say as much as each other would.
@@ -36,6 +36,8 @@ pub(super) struct Check {
     pub(super) drivers: Vec<(&'static str, Vec<f64>)>,
     /// What each row is of.
     pub(super) targets: Vec<usize>,
+    /// By so much a target must differ from the others.
+    pub(super) least_of_target: f64,
 }
 
 /// What stands out most among checks, in words; `None` if nothing does, with everything counted that was asked.
@@ -66,7 +68,7 @@ pub(super) fn stands_out(checks: &[Check]) -> Option<String> {
         let often = counts.iter().filter(|(_, count)| **count >= LEAST_ROWS && counts.len() > 1);
         for (&target, _) in often {
             let is: Vec<f64> = check.targets.iter().map(|own| f64::from(u8::from(*own == target))).collect();
-            take(check.with(&is), LEAST_OF_TARGET, format!("{} by target", check.of));
+            take(check.with(&is), check.least_of_target, format!("{} by target", check.of));
         }
     }
     best.filter(|(p, _)| p * (asked as f64) < FAMILYWISE).map(|(_, what)| what)
@@ -152,6 +154,7 @@ mod tests {
             blocks: (0..count).map(|row| row / 10).collect(),
             drivers: vec![("speed", driver)],
             targets,
+            least_of_target: LEAST_OF_TARGET,
         }
     }
 

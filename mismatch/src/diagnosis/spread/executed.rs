@@ -23,7 +23,7 @@ use crate::diagnosis::fit::Fit;
 use crate::diagnosis::naming::NEAR_END;
 use crate::diagnosis::noise;
 use crate::diagnosis::spread::Explained;
-use crate::diagnosis::spread::check::Check;
+use crate::diagnosis::spread::check::{Check, LEAST_OF_TARGET};
 use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Family, Member, Place, Shown, Shows, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
@@ -142,6 +142,7 @@ impl Density for Windows {
                 blocks,
                 drivers: vec![("time", times), ("size", sizes)],
                 targets: Vec::new(),
+                least_of_target: LEAST_OF_TARGET,
             }
         };
         if parameters[LOSS] > NEVER { Vec::new() } else { vec![each(0), each(1)] }

@@ -17,7 +17,7 @@ use pleiad_physics::{Effect, Floors, RobotModel};
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::noise;
-use crate::diagnosis::spread::check::Check;
+use crate::diagnosis::spread::check::{Check, LEAST_OF_TARGET};
 use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
@@ -192,6 +192,7 @@ impl Sightings {
                 blocks: rows.iter().map(|own| own.1).collect(),
                 drivers,
                 targets: rows.iter().map(|(row, ..)| row.target).collect(),
+                least_of_target: if parameters[MIXED] < NEVER { LEAST_OF_TARGET } else { OFTEN_WRONG },
             };
             let mut drivers = vec![
                 over("range", &|row| row.range_m),
@@ -212,6 +213,10 @@ impl Sightings {
         all
     }
 }
+
+/// Names may be mixed up between two targets alone: then these are wrong more often than the others, but not most of the
+/// time. A wrong name costs at most half of [`noise::CLIP`] squared in log-density; a quarter of the time, this.
+const OFTEN_WRONG: f64 = 3.0;
 
 /// What is left, in words, by kind and part.
 const SPREADS: [[&str; 2]; 2] = [
