@@ -11,6 +11,7 @@
 mod candidate;
 mod chi_square;
 mod corrected;
+mod correlation;
 mod design;
 mod entries;
 mod explained;

@@ -12,6 +12,7 @@ use crate::diagnosis::entries::composition;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::held_out::{self, Gain};
 use crate::diagnosis::profile::{Profile, is_on};
+use crate::diagnosis::robust::{Robust, robust};
 use crate::diagnosis::scan::rectangles;
 use crate::diagnosis::seldom::{Seen, inflation_everywhere, seen};
 use crate::diagnosis::select::{FAMILYWISE, wald};
@@ -41,6 +42,8 @@ pub(crate) struct Estimated {
     pub(crate) errors: Vec<Option<f64>>,
     /// The 95 % intervals of what has no derivative, by the profile of the likelihood; empty if unknown.
     pub(crate) profiled: Vec<Option<[f64; 2]>>,
+    /// Half the widths of the 95 % intervals of the others; where unknown, of their standard errors.
+    pub(crate) halves: Vec<Option<f64>>,
 }
 
 impl Estimated {
@@ -52,7 +55,7 @@ impl Estimated {
             (variance.is_finite() && variance >= 0.0).then(|| variance.sqrt())
         };
         let errors = (0..term.values.len()).map(error).collect();
-        let mut estimated = Self { term, errors, profiled: Vec::new() };
+        let mut estimated = Self { term, errors, profiled: Vec::new(), halves: Vec::new() };
         estimated.make_positive();
         estimated
     }
@@ -89,9 +92,21 @@ impl Estimated {
         if let Some(Some(profiled)) = self.profiled.get(parameter) {
             return Some(*profiled);
         }
-        let error = self.errors[parameter]?;
+        let known = self.halves.get(parameter).copied().flatten();
+        let half = known.or_else(|| Some(Z_95 * self.errors[parameter]?))?;
         let value = self.term.values[parameter];
-        Some([value - Z_95 * error, value + Z_95 * error])
+        Some([value - half, value + half])
+    }
+
+    /// Takes the widths of intervals from the covariance of the final fit: how errors are correlated is seen to, and
+    /// how few blocks may say all.
+    fn widen(&mut self, fit: &Fit, robust: &Robust, position: usize) {
+        let half = |parameter: usize| {
+            let slot = fit.slots.iter().position(|slot| *slot == (position, parameter))?;
+            let half = robust.quantiles[slot] * robust.covariance[(slot, slot)].max(0.0).sqrt();
+            half.is_finite().then_some(half)
+        };
+        self.halves = (0..self.term.values.len()).map(half).collect();
     }
 
     /// The parameters as `findings.json` has them; those that were not fitted and are off stay out.
@@ -192,10 +207,18 @@ pub(crate) fn judge(units: &[&Unit<'_>], support: &Support, gain: Gain, tests: u
     });
     let place = place(&acting, support, &main.term);
     let channel = channel(&acting, support, effect);
+    let mut total = total;
     if verdict.is_some() {
         let profile = Profile::new(&acting, fit);
+        let robust = robust(&acting, fit);
         for (own, &position) in estimated.iter_mut().zip(group) {
             own.profile(&profile, position);
+            if let Some(robust) = &robust {
+                own.widen(fit, robust, position);
+            }
+        }
+        if let Some(robust) = &robust {
+            total = self::total(&acting, (fit, &robust.covariance, group));
         }
     }
     Judged { estimated, total, verdict, p_familywise, channel, place, one_off }

@@ -12,7 +12,6 @@ use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::run::Judgement;
 use crate::diagnosis::unit::Unit;
-use crate::findings::Verdict;
 
 /// So many times what is left of the others, in root mean square, is no noise. Sensors of one kind differ by less.
 const TIMES: f64 = 4.0;
@@ -45,12 +44,11 @@ pub(crate) fn doubt(
         }
         let doubted = judgements.iter_mut().filter(|own| {
             let robots = || own.support.units.iter().map(|&unit| units[unit].robot());
-            own.judged.verdict == Some(Verdict::Named) && robots().all(|robot| robot == rest.robot)
+            own.claims() && robots().all(|robot| robot == rest.robot)
         });
         let mut any = false;
         for own in doubted {
-            own.judged.verdict = Some(Verdict::CannotTell);
-            own.unnamed_rivals.push(format!("something else in {}", rest.channel.name()));
+            own.doubt([format!("something else in {}", rest.channel.name())]);
             any = true;
         }
         if any {

@@ -1,19 +1,20 @@
 //! How unsure the parameters of a final fit are.
 //!
 //! A window ends at the reading with which the next one begins: its error counts in both, with opposite signs, and
-//! cancels in whatever changes slowly. The errors of such a channel are a moving average of order one; its
-//! parameter is that of greatest likelihood, and scores are formed of errors and columns that are freed of it
+//! cancels in whatever changes slowly; and slip lasts longer than a window. How errors of such a channel are
+//! correlated is estimated ([`Correlation`]), and scores are formed of errors and columns that are freed of it
 //! (prewhitening, `andrews1992`). What correlation is left counts by blocks (`liang1986`), whose residuals are too
-//! small by what the block itself has pulled (CR2, `bell2002`). The variance is never below that of the moving
-//! average alone. Where few blocks say all, quantiles are those of Student's t with as many degrees of freedom as
+//! small by what the block itself has pulled (CR2, `bell2002`). The variance is never below that of the estimated
+//! correlation alone. Where few blocks say all, quantiles are those of Student's t with as many degrees of freedom as
 //! blocks that say as much as each other would be.
 //!
-//! The tests of a search keep the covariance of `white`, which is wider: a slow effect must not be found because
-//! errors happen to cancel.
+//! The tests of a search keep the covariance of `white`: a slow effect must not be found because errors happen to
+//! cancel.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::channel::Channel;
+use crate::diagnosis::correlation::{Chain, Correlation};
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::naming::Z_95;
 use crate::diagnosis::noise::Noise;
@@ -21,10 +22,6 @@ use crate::diagnosis::select::whites;
 use crate::diagnosis::unit::{Stretch, Unit};
 use crate::diagnosis::white::{White, raised};
 
-/// The parameter of a moving average is searched from this to zero, in so many steps. Near -1 all that a slow
-/// effect shows cancels.
-const MOST_SHARED: f64 = -0.98;
-const SHARED_STEPS: u32 = 49;
 /// Windows farther apart than this many median steps share no reading.
 const APART: f64 = 1.5;
 /// A block pulls at most this share of the fit towards itself.
@@ -135,7 +132,7 @@ fn shares_readings(channel: Channel) -> bool {
     matches!(channel, Channel::Actuator | Channel::Body | Channel::CommandedBody | Channel::Gyro)
 }
 
-/// Frees errors of their moving average, and changes columns such that their product with the errors stays: of
+/// Frees errors of their correlation, and changes columns such that their product with the errors stays: of
 /// errors `L u`, columns `a` become `L' a`. A pose that two windows share is wrong in the map: forward and left are
 /// turned to there, in metres.
 fn free(
@@ -159,6 +156,8 @@ fn free(
     }
     let times: Vec<f64> = rows.iter().step_by(count).map(|row| row.time_s).collect();
     let apart_s = APART * crate::track::median_step(times.iter().copied());
+    let step_s = (apart_s / APART).max(f64::MIN_POSITIVE);
+    let steps: Vec<f64> = times.windows(2).map(|pair| (pair[1] - pair[0]) / step_s).collect();
     let joins: Vec<bool> = times.windows(2).map(|pair| pair[1] - pair[0] < apart_s).collect();
     for component in 0..count {
         // What agitates a window is its own.
@@ -178,14 +177,15 @@ fn free(
         if own.iter().all(|value| *value == 0.0) {
             continue;
         }
-        let Some(average) = Average::likeliest(&own, &links) else { continue };
-        let freed = average.freed(&own);
+        let chain = Chain { steps: steps.clone(), links, steady };
+        let Some((_, correlation)) = Correlation::likeliest(&own, &chain) else { continue };
+        let freed = correlation.freed(&own);
         let scale = (freed.iter().map(|value| value * value).sum::<f64>() / freed.len() as f64).sqrt();
         for (row, value) in freed.into_iter().enumerate() {
             errors[row * count + component] = value / scale;
         }
         for (_, part) in &mut *shown {
-            for (row, value) in average.gathered(&of(part)).into_iter().enumerate() {
+            for (row, value) in correlation.gathered(&of(part)).into_iter().enumerate() {
                 part[row * count + component] = value * scale;
             }
         }
@@ -198,62 +198,6 @@ fn turn(pair: &mut [f64], factors: [f64; 2], yaw_rad: f64) {
     let (forward, left) = (factors[0] * pair[0], factors[1] * pair[1]);
     pair[0] = cos * forward - sin * left;
     pair[1] = sin * forward + cos * left;
-}
-
-/// The factor `L` of the correlation of a moving average of order one: its diagonal, and below it what a value has
-/// of the one before.
-struct Average {
-    diagonal: Vec<f64>,
-    below: Vec<f64>,
-}
-
-impl Average {
-    /// Of correlation `rho` between values next to each other, times how much they have to do with each other.
-    fn new(rho: f64, links: &[f64]) -> Self {
-        let (mut diagonal, mut below) = (vec![1.0], vec![0.0]);
-        for link in links {
-            let share = rho * link / diagonal[diagonal.len() - 1];
-            below.push(share);
-            diagonal.push((1.0 - share * share).sqrt());
-        }
-        Self { diagonal, below }
-    }
-
-    /// The one that makes values likeliest, their variance being what it then is.
-    fn likeliest(values: &[f64], links: &[f64]) -> Option<Self> {
-        if values.len() != links.len() + 1 {
-            return None;
-        }
-        let mut best: Option<(f64, Self)> = None;
-        for step in 0..=SHARED_STEPS {
-            let theta = MOST_SHARED * f64::from(step) / f64::from(SHARED_STEPS);
-            let average = Self::new(theta / (1.0 + theta * theta), links);
-            let squares: f64 = average.freed(values).iter().map(|value| value * value).sum();
-            let spread: f64 = average.diagonal.iter().map(|value| libm::log(*value)).sum();
-            let likelihood = -0.5 * values.len() as f64 * libm::log(squares) - spread;
-            if likelihood.is_finite() && best.as_ref().is_none_or(|(most, _)| likelihood > *most) {
-                best = Some((likelihood, average));
-            }
-        }
-        best.map(|(_, average)| average)
-    }
-
-    /// `L^-1 e`.
-    fn freed(&self, values: &[f64]) -> Vec<f64> {
-        let mut before = 0.0;
-        let one = |((value, diagonal), below): ((&f64, &f64), &f64)| {
-            before = (value - below * before) / diagonal;
-            before
-        };
-        values.iter().zip(&self.diagonal).zip(&self.below).map(one).collect()
-    }
-
-    /// `L' a`.
-    fn gathered(&self, values: &[f64]) -> Vec<f64> {
-        let next =
-            |index: usize| values.get(index + 1).zip(self.below.get(index + 1)).map_or(0.0, |(a, b)| a * b);
-        values.iter().zip(&self.diagonal).enumerate().map(|(index, (a, d))| a * d + next(index)).collect()
-    }
 }
 
 /// How many blocks that say as much as each other would make the variance of a parameter as sure as it is
@@ -285,44 +229,6 @@ fn quantile(freedom: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_windows_share_is_freed_and_products_stay() {
-        let links = [1.0, 0.5, 0.0, 1.0];
-        let average = Average::new(-0.4, &links);
-        let (errors, column) = ([0.3, -1.2, 0.8, 2.0, -0.1], [1.0, 0.5, -2.0, 0.25, 3.0]);
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let freed = product(&average.freed(&errors), &average.gathered(&column));
-        assert!((freed - product(&errors, &column)).abs() < 1e-12);
-        // The variance of a product with a column: a' R a with the correlations written out.
-        let squares =
-            |column: &[f64]| average.gathered(column).iter().map(|value| value * value).sum::<f64>();
-        let pairs: f64 = (0..4).map(|row| 2.0 * -0.4 * links[row] * column[row] * column[row + 1]).sum();
-        assert!((squares(&column) - (product(&column, &column) + pairs)).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_slow_effect_is_as_sure_as_the_readings_at_both_ends() {
-        // Differences of readings with errors of one: of their mean only the first and the last are left.
-        let mut state = 1_u64;
-        let mut reading = || {
-            (0..12).fold(-6.0, |sum, _| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                sum + (state >> 11) as f64 / (1_u64 << 53) as f64
-            })
-        };
-        let readings: Vec<f64> = (0..401).map(|_| reading()).collect();
-        let scale = 0.5_f64.sqrt();
-        let errors: Vec<f64> = readings.windows(2).map(|pair| scale * (pair[1] - pair[0])).collect();
-        let average = Average::likeliest(&errors, &[1.0; 399]).unwrap();
-        let variance: f64 = average.gathered(&[1.0; 400]).iter().map(|value| value * value).sum();
-        // One of all readings: 2 * scale^2 = 1, instead of 400 of independent errors.
-        assert!((0.5..8.0).contains(&variance), "{variance}");
-        // Readings that are not shared stay independent.
-        let own = Average::likeliest(&readings[..400], &[1.0; 399]).unwrap();
-        let variance: f64 = own.gathered(&[1.0; 400]).iter().map(|value| value * value).sum();
-        assert!((280.0..=400.0 + 1e-9).contains(&variance), "{variance}");
-    }
 
     #[test]
     fn few_blocks_are_as_many_as_say_as_much_as_each_other() {

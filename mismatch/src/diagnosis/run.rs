@@ -55,6 +55,20 @@ pub(crate) struct Judgement {
     pub(crate) unnamed_rivals: Vec<String>,
 }
 
+impl Judgement {
+    /// Whether it says that this and nothing else is the matter: by a name, of physics or of bad data.
+    pub(crate) fn claims(&self) -> bool {
+        matches!(self.judged.verdict, Some(Verdict::Named | Verdict::BadData))
+    }
+
+    /// Makes of a name one of several that cannot be told apart, some of which have none.
+    pub(crate) fn doubt(&mut self, rivals: impl IntoIterator<Item = String>) {
+        self.judged.verdict = Some(Verdict::CannotTell);
+        self.unnamed_rivals.extend(rivals);
+        self.unnamed_rivals.dedup();
+    }
+}
+
 #[allow(clippy::too_many_lines, reason = "the pipeline from top to bottom")]
 pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result<Diagnosis, MismatchError> {
     let tested = roles(recordings, options)?;

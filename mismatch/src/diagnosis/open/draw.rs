@@ -68,7 +68,7 @@ pub(crate) fn shown_form(
         }),
         _ => Vec::new(),
     };
-    Unnamed { finding, partial, shapes }
+    Unnamed { target: form.target, finding, partial, shapes }
 }
 
 pub(crate) fn shown_curve(
@@ -87,7 +87,7 @@ pub(crate) fn shown_curve(
     let shapes = drawn(ground, curve.target, curve.regressor, &partial, &|x| {
         curve.columns.iter().zip(&values).map(|((knot, _), value)| value * curve.basis.value(*knot, x)).sum()
     });
-    Unnamed { finding, partial, shapes }
+    Unnamed { target: curve.target, finding, partial, shapes }
 }
 
 /// Residuals over a regressor, with what a function of it predicts of them.

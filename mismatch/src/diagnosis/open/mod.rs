@@ -28,8 +28,9 @@ use crate::diagnosis::open::search::{Curve, Form, Ground};
 use crate::diagnosis::open::target::Target;
 use crate::diagnosis::run::Judgement;
 use crate::diagnosis::spread::Spread;
+use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::Unit;
-use crate::findings::{Finding, Verdict};
+use crate::findings::Finding;
 use crate::parallel;
 use crate::view::{PartialResidual, Plots, ShapePlot};
 
@@ -40,6 +41,7 @@ const MOST_CURVES: usize = 4;
 
 /// A finding without a name, with what shows it; the number of the finding is the caller's.
 pub(crate) struct Unnamed {
+    pub(crate) target: Target,
     pub(crate) finding: Finding,
     pub(crate) partial: Vec<PartialResidual>,
     pub(crate) shapes: Vec<ShapePlot>,
@@ -96,11 +98,13 @@ pub(crate) fn open(
     let each = parallel::map(&robots.iter().zip(&grounds).collect::<Vec<_>>(), |(robot, ground)| {
         let base = Picture::new(units, fit, **robot);
         let first = hypothesis(ground, base, tests);
-        if first.forms.is_empty() && first.curves.is_empty() && rival::places(units, fit, **robot).is_empty()
-        {
-            return Opened { notes: first.notes, ..Opened::default() };
+        let mut places = rival::places(units, fit, **robot);
+        if first.forms.is_empty() && first.curves.is_empty() {
+            places.extend(rival::joint(&fit.terms, **robot));
+            if places.is_empty() {
+                return Opened { notes: first.notes, ..Opened::default() };
+            }
         }
-        let places = rival::places(units, fit, **robot);
         let (kept, displaced) = rival::compared(ground, fit, **robot, first, &places, tests);
         let mut told = tell::told(ground, held, names, **robot, &kept, tests);
         told.displaced = displaced;
@@ -126,22 +130,24 @@ impl Opened {
         own.flat_map(|(_, target)| target.channels()).any(|(known, _)| *known == channel)
     }
 
-    /// Makes of names what cannot be told, where something unnameable shows in the same channel of the same robot
-    /// and gains a good part of what they gain: the effect may be a makeshift for it.
+    /// Makes of names what cannot be told, where something without a name shows in a channel that they touch: a name
+    /// claims to be the whole of it, and the effect may be a makeshift for a part. Doubt spreads: what touches a channel
+    /// of a name that is doubted may be a makeshift for the same.
     pub(crate) fn doubt(&self, units: &[&Unit<'_>], judgements: &mut [Judgement]) {
-        for own in judgements {
-            let robots: Vec<u32> = own.support.units.iter().map(|&unit| units[unit].robot().0).collect();
-            let doubts = |other: &&Unnamed| {
-                other.finding.verdict == Verdict::Unnameable
-                    && other.finding.channel == own.judged.channel.name()
-                    && robots.iter().all(|robot| other.finding.robots.contains(robot))
-                    && other.finding.held_out.log_score_gain > REST * own.gain.total
-            };
-            let doubted = self.found.iter().filter(doubts);
-            let rivals: Vec<String> = doubted.filter_map(|other| other.finding.expression.clone()).collect();
-            if own.judged.verdict == Some(Verdict::Named) && !rivals.is_empty() {
-                own.judged.verdict = Some(Verdict::CannotTell);
-                own.unnamed_rivals = rivals;
+        let robots: BTreeSet<RobotId> = units.iter().map(|unit| unit.robot()).collect();
+        for robot in robots {
+            let own = |own: &&Unnamed| own.finding.robots.contains(&robot.0);
+            let found: Vec<&Unnamed> = self.found.iter().filter(own).collect();
+            let rivals: Vec<String> = found.iter().filter_map(|own| own.finding.expression.clone()).collect();
+            let mut names: Vec<&mut Judgement> = judgements
+                .iter_mut()
+                .filter(|own| own.claims())
+                .filter(|own| own.support.units.iter().all(|&unit| units[unit].robot() == robot))
+                .collect();
+            let effects: Vec<Effect> = names.iter().map(|own| own.judged.estimated[0].term.effect).collect();
+            let channels = found.iter().flat_map(|own| own.target.channels()).map(|(channel, _)| *channel);
+            for position in makeshifts(&effects, channels.collect()) {
+                names[position].doubt(rivals.iter().cloned());
             }
         }
     }
@@ -184,6 +190,23 @@ impl Opened {
             let finding = first + index;
             plots.partial.extend(own.partial.iter().map(|one| PartialResidual { finding, ..one.clone() }));
             plots.shapes.extend(own.shapes.iter().map(|one| ShapePlot { finding, ..one.clone() }));
+        }
+    }
+}
+
+/// The positions of effects that touch one of these channels, or a channel of another that does. Where two do, all: one
+/// thing moves the whole robot, as a marker of the truth beside its middle, and each name takes up a part of it.
+fn makeshifts(effects: &[Effect], mut channels: BTreeSet<Channel>) -> BTreeSet<usize> {
+    let mut found = BTreeSet::new();
+    loop {
+        let shows = |position: &usize| channels.iter().any(|&channel| touches(effects[*position], channel));
+        let more: Vec<usize> = (0..effects.len()).filter(|own| !found.contains(own)).filter(shows).collect();
+        if more.is_empty() {
+            return if found.len() > 1 { (0..effects.len()).collect() } else { found };
+        }
+        for position in more {
+            channels.extend(Channel::ALL.into_iter().filter(|&channel| touches(effects[position], channel)));
+            found.insert(position);
         }
     }
 }
@@ -287,4 +310,29 @@ pub(crate) fn built<'u, 'a>(base: &Picture<'u, 'a>, curves: &[Curve], forms: &[F
     let mut columns: Vec<_> = curves.iter().flat_map(Curve::all_columns).collect();
     columns.extend(forms.iter().map(|form| form.columns.clone()));
     if columns.is_empty() { base.clone() } else { base.with(&columns) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(effects: &[Effect], channels: &[Channel]) -> Vec<usize> {
+        makeshifts(effects, channels.iter().copied().collect()).into_iter().collect()
+    }
+
+    #[test]
+    fn a_name_in_a_channel_with_something_unnamed_is_doubted_and_one_elsewhere_is_not() {
+        let names = [Effect::IcrOffset, Effect::SensorYawMisalignment];
+        assert_eq!(found(&names, &[Channel::Body]), [0]);
+        assert_eq!(found(&names, &[Channel::BearingToLandmark]), [1]);
+        assert_eq!(found(&names, &[Channel::Gps]), Vec::<usize>::new());
+        assert_eq!(found(&names, &[]), Vec::<usize>::new());
+    }
+
+    #[test]
+    fn where_two_names_are_doubted_all_of_the_robot_are() {
+        // What a marker of the truth beside the middle of a robot is taken for.
+        let names = [Effect::SensorLeverArm, Effect::IcrOffset, Effect::Crab, Effect::GpsLeverArm];
+        assert_eq!(found(&names, &[Channel::Body]), [0, 1, 2, 3]);
+    }
 }

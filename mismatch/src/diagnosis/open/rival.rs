@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 use nalgebra::DMatrix;
 use pleiad_estimation::RobotId;
 
+use crate::channel::Channel;
 use crate::diagnosis::fit::{Effort, Fit, Normal, fit};
 use crate::diagnosis::open::picture::Picture;
 use crate::diagnosis::open::search::{Curve, Form, Ground};
@@ -49,8 +50,17 @@ pub(crate) fn compared<'u, 'a>(
         return (first, BTreeSet::new());
     }
     let shown = suspects.clone();
-    let inflations = first.forms.iter().map(|own| own.inflation);
-    let inflation = inflations.chain(first.curves.iter().map(|own| own.inflation)).fold(1.0, f64::max);
+    let Some(base) = refitted(&ground.units, full, robot, &suspects) else {
+        return (first, BTreeSet::new());
+    };
+    let second = hypothesis(ground, base, tests);
+    if first.forms.is_empty() && first.curves.is_empty() && second.forms.is_empty() {
+        return (first, BTreeSet::new());
+    }
+    // The forms that are all there is: those of the second may hold what the terms of the first explain.
+    let sure = if first.forms.is_empty() && first.curves.is_empty() { &second } else { &first };
+    let inflations = sure.forms.iter().map(|own| own.inflation);
+    let inflation = inflations.chain(sure.curves.iter().map(|own| own.inflation)).fold(1.0, f64::max);
     let rows: usize = ground.units.iter().map(|unit| unit.rows.len()).sum();
     let price = (rows as f64 / inflation).max(2.0).ln();
     let worth = |own: &Hypothesis<'u, 'a>| {
@@ -65,10 +75,6 @@ pub(crate) fn compared<'u, 'a>(
         let terms = slots as f64 * price;
         2.0 * own.picture.log_likelihood() / inflation - forms - curves - terms
     };
-    let Some(base) = refitted(&ground.units, full, robot, &suspects) else {
-        return (first, BTreeSet::new());
-    };
-    let second = hypothesis(ground, base, tests);
     let short = second.short.clone();
     // Beside forms that were found beside everything, effects that lost what they explained go too.
     let still = needed(&first.base, &first, &suspects, full, price * inflation);
@@ -91,11 +97,21 @@ pub(crate) fn compared<'u, 'a>(
         let (forms, curves, notes) = (still.forms, still.curves, Vec::new());
         (Hypothesis { picture, base, forms, curves, short: first.short.clone(), notes }, dropped)
     });
-    let mut best = (worth(&first) + NAME, first, Vec::new());
+    // Names that need a form beside them are no better than a form alone that says it in fewer.
+    let names_alone = first.forms.is_empty() && first.curves.is_empty();
+    let count = |own: &Hypothesis<'u, 'a>| {
+        let terms = own.base.terms.iter().filter(|term| term.acts_on(robot)).count();
+        terms + own.forms.len() + own.curves.len()
+    };
+    let described = count(&first);
+    let mut best = (worth(&first), first, Vec::new());
+    let mut handicap = NAME;
     for (own, dropped) in [Some((second, suspects)), third, fourth].into_iter().flatten() {
         let own_worth = worth(&own);
-        if own_worth > best.0 && !(own.forms.is_empty() && own.curves.is_empty()) {
+        let least = if !names_alone && count(&own) < described { 0.0 } else { handicap };
+        if own_worth > best.0 + least && !(own.forms.is_empty() && own.curves.is_empty()) {
             best = (own_worth, own, dropped);
+            handicap = 0.0;
         }
     }
     let mut displaced: BTreeSet<usize> = best.2.into_iter().collect();
@@ -143,6 +159,18 @@ pub(crate) fn places(units: &[&Unit<'_>], full: &Fit, robot: RobotId) -> Vec<usi
             && said(*term, false) < OTHERS * said(*term, true)
     };
     (0..full.terms.len()).filter(is_place).collect()
+}
+
+/// The terms of a robot that share a channel with another of its own: several may together imitate what one form
+/// describes, and leave nothing in which a form would show.
+pub(crate) fn joint(terms: &[Term], robot: RobotId) -> Vec<usize> {
+    let own: Vec<usize> = (0..terms.len()).filter(|&term| terms[term].whose == Whose::Robot(robot)).collect();
+    let share = |a: usize, b: usize| {
+        let both =
+            |channel: &Channel| touches(terms[a].effect, *channel) && touches(terms[b].effect, *channel);
+        Channel::ALL.iter().any(both)
+    };
+    own.iter().copied().filter(|&a| own.iter().any(|&b| a != b && share(a, b))).collect()
 }
 
 /// The terms of a robot without some, fitted again.
@@ -243,4 +271,27 @@ fn needed(
     }
     let forms = forms.into_iter().map(|form| found.forms[form].clone()).collect();
     Needed { terms, forms, curves: found.curves.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use pleiad_physics::Effect;
+
+    use super::*;
+
+    #[test]
+    fn names_of_one_robot_that_share_a_channel_are_held_against_a_form() {
+        let of = |effect: Effect, robot: u32| {
+            let off = effect.info().parameters.iter().map(|parameter| parameter.off).collect();
+            Term::new(effect, Whose::Robot(RobotId(robot)), off)
+        };
+        let terms = [
+            of(Effect::WheelRadiusError, 1),
+            of(Effect::SensorYawMisalignment, 1),
+            of(Effect::TrackWidthError, 1),
+            of(Effect::WheelRadiusError, 2),
+        ];
+        assert_eq!(joint(&terms, RobotId(1)), [0, 2]);
+        assert_eq!(joint(&terms, RobotId(2)), Vec::<usize>::new());
+    }
 }

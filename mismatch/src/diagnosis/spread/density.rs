@@ -47,6 +47,12 @@ impl Student {
 }
 
 impl Student {
+    /// The log-density of an error of `z` scales over that of none; beyond [`noise::CLIP`] as there.
+    pub(super) fn relative(self, z: f64) -> f64 {
+        let z = z.clamp(-noise::CLIP, noise::CLIP);
+        self.log_density(z, 1.0) - self.log_density(0.0, 1.0)
+    }
+
     /// By how much the log-density of an error of `z` scales grows with the logarithm of the scale.
     pub(super) fn slope(self, z: f64) -> f64 {
         let square = z * z;

@@ -21,7 +21,9 @@ use pleiad_physics::{Context, Effect, Motion, Pose, RobotModel};
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::naming::NEAR_END;
+use crate::diagnosis::noise;
 use crate::diagnosis::spread::Explained;
+use crate::diagnosis::spread::check::{Check, LEAST_OF_TARGET};
 use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Family, Member, Place, Shown, Shows, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
@@ -49,6 +51,8 @@ const GAP_S: f64 = 0.5;
 const BENT: f64 = 0.3;
 /// A lost command must change a window by this share of its noise.
 const LEAST_CHANGE: f64 = 0.3;
+/// A delay of this length, seconds, shows in a window beyond its noise if it is to be looked at.
+const MATTERS_S: f64 = 0.05;
 /// The logarithm of a probability that is as good as zero.
 const NEVER: f64 = -14.0;
 
@@ -62,6 +66,7 @@ struct Row {
     /// What each of the commands asked for changes if it is lost.
     lost: Vec<[f64; 2]>,
     declared_jitter_s: f64,
+    time_s: f64,
 }
 
 struct Windows {
@@ -108,6 +113,39 @@ impl Density for Windows {
             }
             *value = sum;
         }
+    }
+
+    /// A jitter and a loss are drawn anew for every command: neither they nor what they leave of a delay know the time,
+    /// or how much was asked for. What no loss explains is looked at: of windows with one nothing is said.
+    fn checks(&self, parameters: &[f64]) -> Vec<Check> {
+        let each = |part: usize| {
+            let mut late = Vec::new();
+            let mut blocks = Vec::new();
+            let (mut times, mut sizes) = (Vec::new(), Vec::new());
+            for (row, &block) in self.rows.iter().zip(&self.blocks) {
+                let jitter = (parameters[JITTER] + row.declared_jitter_s.powi(2)) / 12.0;
+                let sigma = (libm::exp(2.0 * parameters[NOISE + part]) + jitter * row.agitation[part]).sqrt();
+                let z = (row.residual[part] - parameters[DELAY] * row.delayed[part]) / sigma;
+                // Where no command changes anything a delay does not show.
+                if row.agitation[part].sqrt() * MATTERS_S < sigma {
+                    continue;
+                }
+                let z = z * row.delayed[part].signum();
+                late.push(0.5 * z.clamp(-noise::CLIP, noise::CLIP));
+                blocks.push(block);
+                times.push(row.time_s);
+                sizes.push(row.agitation[part]);
+            }
+            Check {
+                of: "delays",
+                left: late,
+                blocks,
+                drivers: vec![("time", times), ("size", sizes)],
+                targets: Vec::new(),
+                least_of_target: LEAST_OF_TARGET,
+            }
+        };
+        if parameters[LOSS] > NEVER { Vec::new() } else { vec![each(0), each(1)] }
     }
 }
 
@@ -220,6 +258,7 @@ fn collect(
             agitation: [0.0; 2],
             lost: Vec::new(),
             declared_jitter_s,
+            time_s: f64::midpoint(from_s, to_s),
         };
         if changes[first..past].iter().any(|change| change.bent) {
             continue;

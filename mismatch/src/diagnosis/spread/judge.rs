@@ -9,6 +9,7 @@ use crate::diagnosis::naming::{Estimated, GAIN_ERRORS, Judged, NEAR_END};
 use crate::diagnosis::power::POWER_80;
 use crate::diagnosis::select::FAMILYWISE;
 use crate::diagnosis::spread::SpreadTerm;
+use crate::diagnosis::spread::check::stands_out;
 use crate::diagnosis::spread::family::{Family, Member, Shown, Shows};
 use crate::diagnosis::spread::maximum::{Optimum, Uncertainty};
 use crate::diagnosis::term::{Term, Whose};
@@ -23,8 +24,14 @@ pub(super) fn judged(family: &Family<'_, '_>, shows: &Shows, robot: RobotId, tes
     support.extend(&shows.rivals);
     let p_familywise = (shows.p * tests as f64).min(1.0);
     let useful = shows.gain.total > GAIN_ERRORS * shows.gain.standard_error;
-    let verdict =
+    let mut verdict =
         (p_familywise < FAMILYWISE && relevant && useful).then(|| verdict(member.effect, support.len()));
+    // What is left beside the whole of it has no structure.
+    let rest = verdict.and_then(|_| stands_out(&family.density.checks(&shows.with.parameters)));
+    if rest.is_some() {
+        verdict = Some(Verdict::CannotTell);
+    }
+    let unnamed_rivals = rest.into_iter().map(|rest| format!("something else in {rest}")).collect();
     let judged = Judged {
         estimated: vec![estimated],
         total: None,
@@ -34,7 +41,7 @@ pub(super) fn judged(family: &Family<'_, '_>, shows: &Shows, robot: RobotId, tes
         place: Place::default(),
         one_off: false,
     };
-    SpreadTerm { judged, gain: shows.gain, robots: vec![robot], support }
+    SpreadTerm { judged, gain: shows.gain, robots: vec![robot], support, unnamed_rivals }
 }
 
 /// The parameters of the catalogue, from those of a likelihood.
@@ -46,7 +53,7 @@ pub(super) fn estimated(member: &Member, robot: RobotId, with: &Optimum, known: 
     for (free, shown) in term.free.iter_mut().zip(&member.shown) {
         *free = !matches!(shown, Shown::Fixed(_));
     }
-    Estimated { term, errors, profiled: Vec::new() }
+    Estimated { term, errors, profiled: Vec::new(), halves: Vec::new() }
 }
 
 /// The channel of an effect that shows in rows of this one: a row of sightings goes by its range, and truth only

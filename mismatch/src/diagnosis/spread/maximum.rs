@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use crate::diagnosis::spread::check::Check;
 use crate::diagnosis::white::raised;
 
 /// Largest number of steps.
@@ -39,6 +40,11 @@ pub(super) trait Density: Sync {
     /// are to be differenced.
     fn scores(&self, _parameters: &[f64], free: &[usize]) -> Vec<Option<Vec<f64>>> {
         vec![None; free.len()]
+    }
+
+    /// What the density leaves of the rows, to see whether it is structured.
+    fn checks(&self, _parameters: &[f64]) -> Vec<Check> {
+        Vec::new()
     }
 }
 

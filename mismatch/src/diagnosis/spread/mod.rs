@@ -8,6 +8,7 @@
 //!
 //! [`select`]: crate::diagnosis::select
 
+mod check;
 mod density;
 mod executed;
 mod family;
@@ -91,6 +92,8 @@ pub(crate) struct SpreadTerm {
     pub(crate) robots: Vec<RobotId>,
     /// Effects that explain it about equally, its own first.
     pub(crate) support: Vec<Effect>,
+    /// What has no name and may be in its place.
+    pub(crate) unnamed_rivals: Vec<String>,
 }
 
 /// What the stage says.

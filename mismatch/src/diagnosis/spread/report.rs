@@ -66,7 +66,12 @@ impl SpreadTerm {
             effect: Some(info.name.to_owned()),
             expression: None,
             expression_units: None,
-            support_set: self.support.iter().map(|effect| effect.name().to_owned()).collect(),
+            support_set: self
+                .support
+                .iter()
+                .map(|effect| effect.name().to_owned())
+                .chain(self.unnamed_rivals.iter().cloned())
+                .collect(),
             parameters: self.judged.estimated[0].parameters(),
             place: self.judged.place.clone(),
             p_familywise: self.judged.p_familywise,

@@ -16,6 +16,8 @@ use pleiad_physics::{Effect, Floors, RobotModel};
 
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
+use crate::diagnosis::noise;
+use crate::diagnosis::spread::check::{Check, LEAST_OF_TARGET};
 use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Contrast, Family, Member, Place, Shown, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
@@ -49,6 +51,10 @@ struct Row {
     others: Vec<[Option<f64>; 2]>,
     /// How many others were seen at the same instant.
     choices: usize,
+    time_s: f64,
+    speed_m_s: f64,
+    /// The number of its name among those of its kind.
+    target: usize,
 }
 
 struct Sightings {
@@ -109,6 +115,10 @@ impl Density for Sightings {
         }
     }
 
+    fn checks(&self, parameters: &[f64]) -> Vec<Check> {
+        [0, 1].into_iter().flat_map(|kind| self.left(kind, parameters)).collect()
+    }
+
     /// All but the tails' in closed form.
     fn scores(&self, parameters: &[f64], free: &[usize]) -> Vec<Option<Vec<f64>>> {
         let closed = |index: &usize| (*index != TAILS).then(|| vec![0.0; self.rows.len()]);
@@ -160,6 +170,63 @@ impl Density for Sightings {
         all
     }
 }
+
+impl Sightings {
+    /// What is left of each part of a kind: how wide, and on which side.
+    fn left(&self, kind: usize, parameters: &[f64]) -> Vec<Check> {
+        let student = Student::new(parameters[TAILS]);
+        let bases = [0, 1].map(|kind| [0, 1].map(|part| libm::exp(parameters[BASE + 2 * kind + part])));
+        let own = || self.rows.iter().zip(&self.blocks).filter(|(row, _)| row.kind == kind);
+        let z =
+            |row: &Row, part: usize| Some(row.errors[part]? / Self::sigmas(row, &bases, parameters)[part]);
+        let mut all = Vec::new();
+        for part in 0..2 {
+            let rows: Vec<(&Row, usize, f64)> =
+                own().filter_map(|(row, block)| Some((row, *block, z(row, part)?))).collect();
+            let over = |name: &'static str, of: &dyn Fn(&Row) -> f64| {
+                (name, rows.iter().map(|(row, ..)| of(row)).collect::<Vec<f64>>())
+            };
+            let check = |of: &'static str, left: Vec<f64>, drivers: Vec<(&'static str, Vec<f64>)>| Check {
+                of,
+                left,
+                blocks: rows.iter().map(|own| own.1).collect(),
+                drivers,
+                targets: rows.iter().map(|(row, ..)| row.target).collect(),
+                least_of_target: if parameters[MIXED] < NEVER { LEAST_OF_TARGET } else { OFTEN_WRONG },
+            };
+            let mut drivers = vec![
+                over("range", &|row| row.range_m),
+                over("turning", &|row| row.yaw_rate_rad_s.abs()),
+                over("speed", &|row| row.speed_m_s.abs()),
+                over("time", &|row| row.time_s),
+            ];
+            // A wrong name makes range and bearing wrong at once; tails are each its own.
+            if part == 0 && parameters[MIXED] < NEVER {
+                let bearing = |row: &Row| z(row, 1).map_or(0.0, |z| student.relative(z));
+                drivers.push(over("bearing", &bearing));
+            }
+            let left = rows.iter().map(|own| student.relative(own.2)).collect();
+            all.push(check(SPREADS[kind][part], left, drivers));
+            let mean = rows.iter().map(|own| own.2.clamp(-noise::CLIP, noise::CLIP)).collect();
+            all.push(check(MEANS[kind][part], mean, Vec::new()));
+        }
+        all
+    }
+}
+
+/// Names may be mixed up between two targets alone: then these are wrong more often than the others, but not most of the
+/// time. A wrong name costs at most half of [`noise::CLIP`] squared in log-density; a quarter of the time, this.
+const OFTEN_WRONG: f64 = 3.0;
+
+/// What is left, in words, by kind and part.
+const SPREADS: [[&str; 2]; 2] = [
+    ["the spread of ranges to landmarks", "the spread of bearings of landmarks"],
+    ["the spread of ranges to robots", "the spread of bearings of robots"],
+];
+const MEANS: [[&str; 2]; 2] = [
+    ["the mean of ranges to landmarks", "the mean of bearings of landmarks"],
+    ["the mean of ranges to robots", "the mean of bearings of robots"],
+];
 
 /// The sightings of one robot under a fit of the mean.
 pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family<'u, 'a>> {
@@ -314,6 +381,7 @@ fn collect(
                     continue;
                 }
                 let others = targets.iter().filter(|(target, _)| *target != named);
+                let number = targets.iter().position(|(target, _)| *target == named).unwrap_or_default();
                 let at = &own.sighted.at;
                 let choices = if repeats {
                     scan.readings.len() - 1
@@ -329,6 +397,9 @@ fn collect(
                     errors,
                     others: others.map(|(_, seen)| own.errors(unit, model, seen).0).collect(),
                     choices,
+                    time_s: scan.time_s,
+                    speed_m_s: own.sighted.at.motion.speed_m_s,
+                    target: number,
                 });
                 let channel = channels[usize::from(own.measured[0].is_none())];
                 places.push(Place { unit: position, time_s: scan.time_s, channel });
@@ -350,6 +421,9 @@ mod tests {
             errors,
             others,
             choices,
+            time_s: 0.0,
+            speed_m_s: 0.0,
+            target: 0,
         };
         let rows = vec![
             row(0, 2.0, 0.3, [Some(0.04), Some(-0.01)], vec![[Some(0.5), Some(0.02)]], 2),

@@ -177,6 +177,7 @@ fn term(pair: Pair, whose: Whose, robots: Vec<RobotId>, p: f64, gain: Gain, test
         term: Term::new(effect, whose, values),
         errors: vec![Some(0.0); 2],
         profiled: Vec::new(),
+        halves: Vec::new(),
     };
     let p_familywise = (p * tests as f64).min(1.0);
     let named = p_familywise < FAMILYWISE && gain.total > GAIN_ERRORS * gain.standard_error;
@@ -189,7 +190,7 @@ fn term(pair: Pair, whose: Whose, robots: Vec<RobotId>, p: f64, gain: Gain, test
         place: Place::default(),
         one_off: false,
     };
-    SpreadTerm { judged, gain, robots, support: vec![effect] }
+    SpreadTerm { judged, gain, robots, support: vec![effect], unnamed_rivals: Vec::new() }
 }
 
 fn effect((first, second): Pair) -> ActiveEffect<f64> {

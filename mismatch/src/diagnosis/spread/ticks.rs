@@ -74,6 +74,7 @@ pub(super) fn coarse(units: &[&Unit<'_>], robot: RobotId, tests: usize) -> Optio
         term: Term::new(Effect::EncoderCoarse, Whose::Robot(robot), vec![ticks]),
         errors: vec![Some(error(&changes, tick_rad).max(LEAST_ERROR) * ticks)],
         profiled: Vec::new(),
+        halves: Vec::new(),
     };
     let channel = if units.iter().any(|unit| unit.stretch(Channel::Actuator).is_some()) {
         Channel::Actuator
@@ -90,7 +91,8 @@ pub(super) fn coarse(units: &[&Unit<'_>], robot: RobotId, tests: usize) -> Optio
         place: Place::default(),
         one_off: false,
     };
-    Some(SpreadTerm { judged, gain, robots: vec![robot], support: vec![Effect::EncoderCoarse] })
+    let support = vec![Effect::EncoderCoarse];
+    Some(SpreadTerm { judged, gain, robots: vec![robot], support, unnamed_rivals: Vec::new() })
 }
 
 /// Whether a robot recorded angles of its wheels.
