@@ -38,7 +38,9 @@ pub struct MapOptions {
     pub cell_m: f64,
     /// The local grid is of so many scans, the last of them at the end of the stretch.
     pub scans: usize,
-    /// `mu_min`: a stretch counts only where `|G| + |G'|`, over the cells that were seen, is at least this.
+    /// `mu_min`: a stretch counts only where `|G| + |G'|`, over the cells that were seen, is at least this. Free cells add
+    /// nothing: a metre of wall that is seen whole adds about two over the side of a cell, in each of the grids. The default
+    /// is half a metre of wall with cells of 0.1 m: less says at most how far one wall is.
     pub mu_min: f64,
     /// A stretch is searched up to this far from what is believed.
     pub reach: Drift,
@@ -52,7 +54,7 @@ impl Default for MapOptions {
             stretch_m: 1.0,
             cell_m: 0.1,
             scans: 3,
-            mu_min: 60.0,
+            mu_min: 10.0,
             reach: Drift { trans: 0.06, rot_rad_m: 0.06 },
         }
     }

@@ -242,8 +242,11 @@ mod tests {
     fn walls_are_occupied_and_the_room_is_free() {
         let room = [[0.0, 0.0, 2.0, 0.0], [2.0, 0.0, 2.0, 1.0], [2.0, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]];
         let grid = Grid::of_walls(&room, 0.1, 0.2).unwrap();
-        assert!(grid.at([1.0, 0.5]) == 0.0
-                && grid.at([-5.0, 0.0]) == UNKNOWN && grid.at([f64::NAN; 2]) == UNKNOWN);
+        assert!(
+            grid.at([1.0, 0.5]) == 0.0
+                && grid.at([-5.0, 0.0]) == UNKNOWN
+                && grid.at([f64::NAN; 2]) == UNKNOWN
+        );
         // A cell half a cell from the wall is half occupied, on both sides.
         for y in [-0.05, 0.05] {
             assert!((grid.at([1.0, y]) - 0.5).abs() < 1e-9);

@@ -172,7 +172,8 @@ mod tests {
     /// Cells in which the map is free for every pair of a search are added up once: the match is the same to rounding.
     #[test]
     fn cells_that_are_set_aside_change_no_match() {
-        let room = [[-3.0, -2.0, 3.0, -2.0], [3.0, -2.0, 3.0, 2.0], [3.0, 2.0, -3.0, 2.0], [-3.0, 2.0, -3.0, -2.0]];
+        let room =
+            [[-3.0, -2.0, 3.0, -2.0], [3.0, -2.0, 3.0, 2.0], [3.0, 2.0, -3.0, 2.0], [-3.0, 2.0, -3.0, -2.0]];
         let map = Grid::of_walls(&room, 0.1, 1.0).unwrap();
         let local: Vec<LocalCell> = (-25..25)
             .flat_map(|x| (-18..18).map(move |y| (x, y)))
@@ -183,7 +184,8 @@ mod tests {
             .collect();
         let moves = vec![Pose::new(0.1, 0.0, 0.02); 10];
         let matched = Matched { map: &map, local: &local, start: Pose::new(-0.5, 0.1, 0.2), moves: &moves };
-        let (centre, half) = (Drift { trans: 0.02, rot_rad_m: -0.03 }, Drift { trans: 0.06, rot_rad_m: 0.06 });
+        let (centre, half) =
+            (Drift { trans: 0.02, rot_rad_m: -0.03 }, Drift { trans: 0.06, rot_rad_m: 0.06 });
         let (fixed, varied) = matched.part(centre, half, 1);
         assert!(varied.len() < local.len() / 2, "{} of {}", varied.len(), local.len());
         for (along, across) in [(-1.0, -1.0), (-1.0, 1.0), (0.0, 0.3), (1.0, -1.0), (1.0, 1.0)] {

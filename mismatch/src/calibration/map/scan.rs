@@ -127,15 +127,22 @@ mod tests {
         let beam = BeamSample { range_m: 1.05, ..beam };
         let grid = local_grid(&[(Pose::new(0.05, 0.05, 0.0), &[beam])], 0.1);
         let [front, behind] = [10.0, 11.0].map(|column: f64| {
-            grid.iter().find(|cell| (cell.centre_m[0] - 0.1 * column - 0.05).hypot(cell.centre_m[1] - 0.05) < 1e-9)
+            grid.iter()
+                .find(|cell| (cell.centre_m[0] - 0.1 * column - 0.05).hypot(cell.centre_m[1] - 0.05) < 1e-9)
         });
-        assert!((front.unwrap().occupied - 0.5).abs() < 1e-9 && (behind.unwrap().occupied - 0.5).abs() < 1e-9);
+        assert!(
+            (front.unwrap().occupied - 0.5).abs() < 1e-9 && (behind.unwrap().occupied - 0.5).abs() < 1e-9
+        );
     }
 
     #[test]
     fn nothing_is_said_of_cells_between_the_places_that_neighbours_met() {
         // A wall 1 m to the left, seen at flat angles: the second beam passes over the wall just before it ends.
-        let beam = |bearing_rad: f64| BeamSample { time: Timestamp(0), bearing_rad, range_m: 1.0 / bearing_rad.sin() };
+        let beam = |bearing_rad: f64| BeamSample {
+            time: Timestamp(0),
+            bearing_rad,
+            range_m: 1.0 / bearing_rad.sin(),
+        };
         let beams = [beam(0.25), beam(0.2)];
         let grid = local_grid(&[(Pose::new(0.0, 0.0, 0.0), &beams)], 0.1);
         let free_on_wall = |cell: &&LocalCell| cell.occupied == 0.0 && (cell.centre_m[1] - 1.0).abs() < 0.09;
