@@ -254,7 +254,7 @@ mod tests {
         assert!(grid.at([1.0, 0.1]) < 1e-9 && grid.at([1.0, 0.0]) > 0.85);
         // Blocks know of every wall that is the nearest of one of their cells.
         for step in 0..400 {
-            let at = [-0.15 + 0.006 * f64::from(step), 1.1 - 0.003 * f64::from(step)];
+            let at = [-0.15 + 0.0055 * f64::from(step), 1.1 - 0.003 * f64::from(step)];
             let exact = room.iter().map(|wall| distance_m(at, wall)).fold(f64::INFINITY, f64::min);
             assert!((grid.distance_m(at).unwrap() - exact).abs() < 0.025, "{at:?}");
         }

@@ -111,28 +111,39 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn a_beam_frees_its_way_and_occupies_its_end_before_and_behind_alike() {
-        // The place it met is the centre of a cell.
-        let beam = BeamSample { time: Timestamp(0), bearing_rad: 0.0, range_m: 1.0 };
-        let grid = local_grid(&[(Pose::new(0.05, 0.05, 0.0), &[beam])], 0.1);
-        let of = |column: i64, row: i64| {
-            let [x, y] = centre([column, row], 0.1);
-            let near = |cell: &&LocalCell| (cell.centre_m[0] - x).hypot(cell.centre_m[1] - y) < 1e-9;
-            grid.iter().find(near).map(|cell| cell.occupied)
+    /// A wall across the way, met by three beams, `wall_m` ahead.
+    fn ahead(wall_m: f64) -> Vec<LocalCell> {
+        let beam = |bearing_rad: f64| BeamSample {
+            time: Timestamp(0),
+            bearing_rad,
+            range_m: (wall_m - 0.05) / bearing_rad.cos(),
         };
-        assert!((0..9).all(|column| of(column, 0) == Some(0.0)), "{grid:?}");
-        assert!((of(10, 0).unwrap() - 1.0).abs() < 1e-9);
-        // Where it lies between two centres, both are as occupied, whichever side they are on.
-        let beam = BeamSample { range_m: 1.05, ..beam };
-        let grid = local_grid(&[(Pose::new(0.05, 0.05, 0.0), &[beam])], 0.1);
-        let [front, behind] = [10.0, 11.0].map(|column: f64| {
-            grid.iter()
-                .find(|cell| (cell.centre_m[0] - 0.1 * column - 0.05).hypot(cell.centre_m[1] - 0.05) < 1e-9)
-        });
-        assert!(
-            (front.unwrap().occupied - 0.5).abs() < 1e-9 && (behind.unwrap().occupied - 0.5).abs() < 1e-9
-        );
+        local_grid(&[(Pose::new(0.05, 0.05, 0.0), &[beam(-0.2), beam(0.0), beam(0.2)])], 0.1)
+    }
+
+    fn of(grid: &[LocalCell], column: i64) -> Option<f64> {
+        let [x, y] = centre([column, 0], 0.1);
+        let near = |cell: &&LocalCell| (cell.centre_m[0] - x).hypot(cell.centre_m[1] - y) < 1e-9;
+        grid.iter().find(near).map(|cell| cell.occupied)
+    }
+
+    #[test]
+    fn a_beam_frees_its_way_and_a_surface_is_as_sure_behind_as_before() {
+        // The wall lies on the centre of a cell, and then on the border of two.
+        let grid = ahead(1.05);
+        assert!((0..9).all(|column| of(&grid, column) == Some(0.0)), "{grid:?}");
+        assert!((of(&grid, 10).unwrap() - 1.0).abs() < 1e-9);
+        let grid = ahead(1.1);
+        let [front, behind] = [10, 11].map(|column| of(&grid, column).unwrap());
+        assert!((front - 0.5).abs() < 1e-9 && (behind - 0.5).abs() < 1e-9, "{front} {behind}");
+    }
+
+    #[test]
+    fn an_edge_says_nothing_of_how_its_surface_goes_on() {
+        let beam = |bearing_rad: f64, range_m: f64| BeamSample { time: Timestamp(0), bearing_rad, range_m };
+        let beams = [beam(-0.2, 2.0), beam(0.0, 1.0), beam(0.2, 2.0)];
+        let grid = local_grid(&[(Pose::new(0.05, 0.05, 0.0), &beams)], 0.1);
+        assert!(grid.iter().all(|cell| cell.occupied == 0.0), "{grid:?}");
     }
 
     #[test]
