@@ -81,8 +81,7 @@ fn one_scan(pose: &Pose<f64>, beams: &[BeamSample], cell_m: f64) -> BTreeMap<[i6
         let off = |point: [f64; 2]| {
             ((point[0] - before[0]) * along[1] - (point[1] - before[1]) * along[0]).abs() / length_m
         };
-        // Also false where the three are one place.
-        if !(off(*to) <= 0.5 * cell_m) {
+        if length_m <= 0.0 || off(*to) > 0.5 * cell_m {
             continue;
         }
         // Casts of coordinates within a map.
