@@ -60,8 +60,8 @@ pub struct MapArgs {
     /// Weight of what is believed against what a stretch says: 1 never adapts, 0 follows every stretch.
     #[arg(long, default_value_t = 0.9, requires = "recording")]
     pub gamma: f64,
-    /// A stretch counts only where the grids hold at least this much.
-    #[arg(long, default_value_t = 60.0, requires = "recording")]
+    /// A stretch counts only where what is occupied adds up to this, over the cells of both grids.
+    #[arg(long, default_value_t = 10.0, requires = "recording")]
     pub mu_min: f64,
     /// Driven between matches, metres.
     #[arg(long, default_value_t = 1.0, requires = "recording")]

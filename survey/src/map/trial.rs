@@ -1,9 +1,9 @@
 //! One run, calibrated in several ways.
 
-use pleiad_estimation::RobotId;
-use pleiad_mismatch::calibration::map::{Drift, MapCalibration, MapOptions, calibrate};
+use pleiad_estimation::{RobotId, Timestamp};
+use pleiad_mismatch::calibration::map::{Drift, MapCalibration, MapOptions, Stretch, calibrate};
 use pleiad_physics::{ActiveEffect, Effect};
-use pleiad_sim_peers::{Scenario, simulate};
+use pleiad_sim_peers::{Scenario, SimulatedRun, simulate};
 
 use super::failed;
 use crate::error::SurveyError;
@@ -15,7 +15,11 @@ pub(super) const GAMMAS: [f64; 4] = [0.0, 0.5, 0.9, 1.0];
 /// The one that is judged: the default.
 pub(super) const JUDGED: usize = 2;
 /// Bounds on what has to be seen that are shown.
-pub(super) const MU_MINS: [f64; 4] = [0.0, 1100.0, 1200.0, 1300.0];
+pub(super) const MU_MINS: [f64; 4] = [0.0, 10.0, 30.0, 100.0];
+/// The default of them.
+pub(super) const DEFAULT_MU: usize = 1;
+/// Of a scanner that sees little in this room, metres: `mu_min` is tried with it.
+pub(super) const SHORT_M: f64 = 4.0;
 const ROBOT: RobotId = RobotId(1);
 /// The estimate of a half is its mean over the last part of it, so long as a share of the half.
 const LAST: f64 = 0.4;
@@ -35,8 +39,9 @@ pub struct Trial {
     pub windows: [Window; 2],
     /// Per `GAMMAS`, from wrong parameters.
     pub by_gamma: Vec<MapCalibration>,
-    /// Per `MU_MINS`, with gamma 0, from no error: what single stretches say. `None` where nothing could be matched.
-    pub by_mu: Vec<Option<MapCalibration>>,
+    /// Per `MU_MINS`, from no error, with a scanner of `SHORT_M`; and the mean distance from the truth at the ends of
+    /// stretches, metres. `None` where nothing could be matched.
+    pub by_mu: Vec<Option<(MapCalibration, f64)>>,
     /// Mean distance from the truth at the ends of stretches, metres: with matching, and by odometry alone.
     pub off_m: [f64; 2],
 }
@@ -50,22 +55,21 @@ impl Trial {
         for gamma in GAMMAS {
             by_gamma.push(with(MapOptions { gamma, start: WRONG, ..wide() }).map_err(failed)?);
         }
-        let by_mu = MU_MINS
-            .map(|mu_min| with(MapOptions { gamma: 1.0, mu_min, ..MapOptions::default() }).ok())
-            .into();
-        let off = |poses: &MapCalibration| {
-            let own = &run.tracks[&ROBOT];
-            let far = |time_s: f64, [x, y, _]: [f64; 3]| {
-                let truth = own.pose_at(pleiad_estimation::Timestamp::from_seconds(time_s));
-                (truth.x_m() - x).hypot(truth.y_m() - y)
-            };
-            let all = poses.stretches.iter().map(|stretch| far(stretch.time_s, stretch.pose));
-            all.sum::<f64>() / poses.stretches.len() as f64
-        };
+        let mut short = scenario.clone();
+        if let Some(settings) = short.robots.get_mut(&ROBOT) {
+            settings.scan.max_range_m = SHORT_M;
+        }
+        let short = simulate(&short, seed).map_err(failed)?;
+        let by_mu = MU_MINS.map(|mu_min| {
+            let options = MapOptions { mu_min, ..MapOptions::default() };
+            let found = calibrate(&short.recording, ROBOT, &options).ok()?;
+            let off_m = off_m(&short, &found);
+            Some((found, off_m))
+        });
         // With nothing to search odometry is taken as it is.
         let blind = MapOptions { gamma: 1.0, reach: Drift::default(), ..MapOptions::default() };
-        let off_m = [off(&by_gamma[JUDGED]), off(&with(blind).map_err(failed)?)];
-        Ok(Self { windows, by_gamma, by_mu, off_m })
+        let off_m = [off_m(&run, &by_gamma[JUDGED]), off_m(&run, &with(blind).map_err(failed)?)];
+        Ok(Self { windows, by_gamma, by_mu: by_mu.into(), off_m })
     }
 
     /// What is believed in the last part of a half, by the calibration with the judged gamma.
@@ -74,22 +78,29 @@ impl Trial {
     }
 
     /// Values of the stretches in the last part of a half.
-    pub(super) fn last(
+    pub(super) fn last(&self, half: usize, gamma: usize, of: fn(&Stretch) -> Option<Drift>) -> Vec<Drift> {
+        self.settled(half, &self.by_gamma[gamma]).filter_map(of).collect()
+    }
+
+    /// The stretches in the last part of a half.
+    pub(super) fn settled<'a>(
         &self,
         half: usize,
-        gamma: usize,
-        of: fn(&pleiad_mismatch::calibration::map::Stretch) -> Option<Drift>,
-    ) -> Vec<Drift> {
+        found: &'a MapCalibration,
+    ) -> impl Iterator<Item = &'a Stretch> + use<'a> {
         let [from, until] = self.windows[half].time_s;
         let from = until - LAST * (until - from);
-        let within = |time_s: f64| (from..until).contains(&time_s);
-        self.by_gamma[gamma]
-            .stretches
-            .iter()
-            .filter(|stretch| within(stretch.time_s))
-            .filter_map(of)
-            .collect()
+        found.stretches.iter().filter(move |stretch| (from..until).contains(&stretch.time_s))
     }
+}
+
+/// Mean distance from the truth at the ends of stretches, metres.
+fn off_m(run: &SimulatedRun, found: &MapCalibration) -> f64 {
+    let far = |stretch: &Stretch| {
+        let truth = run.tracks[&ROBOT].pose_at(Timestamp::from_seconds(stretch.time_s));
+        (truth.x_m() - stretch.pose[0]).hypot(truth.y_m() - stretch.pose[1])
+    };
+    found.stretches.iter().map(far).sum::<f64>() / found.stretches.len() as f64
 }
 
 /// A search that reaches the truth from wrong parameters.

@@ -6,17 +6,15 @@ use pleiad_recording::{BeamSample, Recording};
 use serde::Serialize;
 
 use super::error::MapError;
-use super::grid::{Grid, extent, match_score};
+use super::grid::{Grid, extent};
+use super::matched::{Matched, predicted};
 use super::scan::{LocalCell, local_grid};
 use crate::calibration::reckoned::{Reckoned, reckon};
 
 /// Around the walls the map says that nothing is, so far, metres.
 const MARGIN_M: f64 = 1.0;
 /// No map has more cells along an axis.
-const MOST_CELLS: f64 = 5000.0;
-/// The first search has so many steps to either side, and each of the following ones halves them.
-const STEPS: i32 = 6;
-const ROUNDS: u32 = 4;
+const MOST_CELLS: f64 = 1500.0;
 
 /// Errors per metre driven; backwards they change their sign.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -40,7 +38,9 @@ pub struct MapOptions {
     pub cell_m: f64,
     /// The local grid is of so many scans, the last of them at the end of the stretch.
     pub scans: usize,
-    /// `mu_min`: a stretch counts only where `|G| + |G'|`, over the cells that were seen, is at least this.
+    /// `mu_min`: a stretch counts only where `|G| + |G'|`, over the cells that were seen, is at least this. Free cells add
+    /// nothing: a metre of wall that is seen whole adds about two over the side of a cell, in each of the grids. The default
+    /// is half a metre of wall with cells of 0.1 m: less says at most how far one wall is.
     pub mu_min: f64,
     /// A stretch is searched up to this far from what is believed.
     pub reach: Drift,
@@ -54,7 +54,7 @@ impl Default for MapOptions {
             stretch_m: 1.0,
             cell_m: 0.1,
             scans: 3,
-            mu_min: 60.0,
+            mu_min: 10.0,
             reach: Drift { trans: 0.06, rot_rad_m: 0.06 },
         }
     }
@@ -182,13 +182,10 @@ impl Driven<'_> {
             if here.path_m - begun.path_m < options.stretch_m {
                 continue;
             }
-            let moves = self.moves(&begun, &here);
             let local = self.local(number, &here, estimate);
-            let score = |drift: Drift| {
-                let at = predicted(&pose, &moves, drift);
-                match_score(pairs(&local, self.map, &at), options.mu_min)
-            };
-            let found = search(estimate, options.reach, score);
+            let matched =
+                Matched { map: self.map, local: &local, start: pose, moves: &self.moves(&begun, &here) };
+            let found = matched.search(estimate, options.reach, options.mu_min);
             let best = found.map(|(best, _)| best);
             if let Some(best) = best {
                 let (gamma, rest) = (options.gamma, 1.0 - options.gamma);
@@ -197,12 +194,12 @@ impl Driven<'_> {
                     rot_rad_m: gamma * estimate.rot_rad_m + rest * best.rot_rad_m,
                 };
             }
-            pose = predicted(&pose, &moves, best.unwrap_or(estimate));
-            let seen: f64 = pairs(&local, self.map, &pose).map(|[ours, map]| ours + map).sum();
+            let ended = matched.at(best.unwrap_or(estimate));
+            pose = ended.pose;
             stretches.push(Stretch {
                 time_s: here.time.seconds(),
                 path_m: here.path_m,
-                seen,
+                seen: ended.seen,
                 best,
                 score: found.map(|(_, score)| score),
                 estimate,
@@ -257,83 +254,5 @@ impl Driven<'_> {
             })
             .collect();
         local_grid(&placed, self.options.cell_m)
-    }
-}
-
-/// Where motions of odometry lead with these errors: `D_trans = d_trans + a_trans l`, `D_rot = d_rot + a_rot l`, the error
-/// of the turn half before and half after each motion.
-fn predicted(start: &Pose<f64>, moves: &[Pose<f64>], drift: Drift) -> Pose<f64> {
-    let mut pose = *start;
-    for moved in moves {
-        let half = Pose::new(0.0, 0.0, 0.5 * drift.rot_rad_m * moved.x_m);
-        let along = Pose::new(moved.x_m * (1.0 + drift.trans), moved.y_m, moved.yaw_rad);
-        pose = pose.compose(&half).compose(&along).compose(&half);
-    }
-    pose
-}
-
-/// Cells of the local grid and of the map's cut-out at a pose.
-fn pairs<'a>(
-    local: &'a [LocalCell],
-    map: &'a Grid,
-    pose: &Pose<f64>,
-) -> impl Iterator<Item = [f64; 2]> + use<'a> {
-    let pose = *pose;
-    let (sine, cosine) = pose.yaw_rad.sin_cos();
-    local.iter().map(move |cell| {
-        let [x, y] = cell.centre_m;
-        let at = [pose.x_m + cosine * x - sine * y, pose.y_m + sine * x + cosine * y];
-        [cell.occupied, map.at(at)]
-    })
-}
-
-/// The pair with the greatest score, first over the whole reach and then closer and closer; of equals the one nearest to
-/// the middle. `None` where there is no score.
-fn search(middle: Drift, reach: Drift, score: impl Fn(Drift) -> Option<f64>) -> Option<(Drift, f64)> {
-    let mut best = (middle, score(middle)?);
-    let mut step =
-        Drift { trans: reach.trans / f64::from(STEPS), rot_rad_m: reach.rot_rad_m / f64::from(STEPS) };
-    for round in 0..ROUNDS {
-        let centre = best.0;
-        let steps = if round == 0 { STEPS } else { 2 };
-        for along in -steps..=steps {
-            for across in -steps..=steps {
-                let drift = Drift {
-                    trans: centre.trans + f64::from(along) * step.trans,
-                    rot_rad_m: centre.rot_rad_m + f64::from(across) * step.rot_rad_m,
-                };
-                if let Some(found) = score(drift).filter(|found| *found > best.1) {
-                    best = (drift, found);
-                }
-            }
-        }
-        step = Drift { trans: 0.5 * step.trans, rot_rad_m: 0.5 * step.rot_rad_m };
-    }
-    Some(best)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_straight_metre_with_errors_is_a_longer_arc() {
-        // Ten steps of 0.1 m: the arc of 1.02 m that turns by 0.03 rad, to the order of the steps.
-        let moves = vec![Pose::new(0.1, 0.0, 0.0); 10];
-        let end = predicted(&Pose::identity(), &moves, Drift { trans: 0.02, rot_rad_m: 0.03 });
-        let arc = Pose::exp(1.02, 0.0, 0.03);
-        assert!((end.x_m - arc.x_m).abs() < 1e-5 && (end.y_m - arc.y_m).abs() < 1e-5, "{end:?} {arc:?}");
-        assert!((end.yaw_rad - 0.03).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_search_finds_the_summit_of_a_known_hill_and_stays_where_all_is_level() {
-        let hill = |drift: Drift| Some(1.0 - (drift.trans - 0.031).abs() - (drift.rot_rad_m + 0.017).abs());
-        let reach = Drift { trans: 0.06, rot_rad_m: 0.06 };
-        let (best, _) = search(Drift::default(), reach, hill).unwrap();
-        assert!((best.trans - 0.031).abs() < 0.0013 && (best.rot_rad_m + 0.017).abs() < 0.0013, "{best:?}");
-        let middle = Drift { trans: 0.01, rot_rad_m: 0.02 };
-        assert_eq!(search(middle, reach, |_| Some(0.5)), Some((middle, 0.5)));
-        assert_eq!(search(middle, reach, |_| None), None);
     }
 }

@@ -2,21 +2,28 @@
 
 /// Of a cell of which nothing is known.
 pub(super) const UNKNOWN: f64 = 0.5;
-/// Of a cell that a beam met something in, and of one that it went through: an inverse sensor model of two values.
-pub(super) const OCCUPIED: f64 = 0.95;
-pub(super) const FREE: f64 = 0.05;
+/// The global grid is finer than the local one by this: what is cut from it at a pose is then interpolated over parts of
+/// a cell alone.
+const FINER: f64 = 4.0;
+/// Walls that are near to some cell of a block are sought once for the block; its side in cells.
+const BLOCK: usize = 16;
+
+/// How occupied a cell is whose centre is so far from a surface: 1 on it, 0 from a cell away on, on either side alike.
+pub(super) fn occupancy(distance_m: f64, cell_m: f64) -> f64 {
+    (1.0 - distance_m / cell_m).max(0.0)
+}
 
 /// A grid over a rectangle of the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     /// Lower left corner, metres.
     origin_m: [f64; 2],
-    /// Side of a cell, metres.
+    /// Side of a cell of what is compared, metres; this grid's own are a quarter of it.
     cell_m: f64,
     columns: usize,
     rows: usize,
-    /// Probabilities, row by row from below.
-    cells: Vec<f64>,
+    /// From the centres to the nearest wall, metres, row by row from below.
+    distances_m: Vec<f64>,
 }
 
 impl Grid {
@@ -25,52 +32,79 @@ impl Grid {
     pub fn of_walls(walls: &[[f64; 4]], cell_m: f64, margin_m: f64) -> Option<Self> {
         let (low, high) = extent(walls)?;
         let origin_m = low.map(|end| end - margin_m);
+        let side_m = cell_m / FINER;
         // The cast saturates; the size was checked by who calls.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let [columns, rows] =
-            [0, 1].map(|axis| ((high[axis] + margin_m - origin_m[axis]) / cell_m).ceil() as usize);
-        let centre = |index: usize| {
-            let (column, row) = (index % columns, index / columns);
-            [origin_m[0] + (column as f64 + 0.5) * cell_m, origin_m[1] + (row as f64 + 0.5) * cell_m]
-        };
-        let occupied = |index: usize| {
-            let nearest_m =
-                walls.iter().map(|wall| distance_m(centre(index), wall)).fold(f64::INFINITY, f64::min);
-            FREE + (OCCUPIED - FREE) * (1.0 - nearest_m / cell_m).max(0.0)
-        };
-        Some(Self { origin_m, cell_m, columns, rows, cells: (0..columns * rows).map(occupied).collect() })
+            [0, 1].map(|axis| ((high[axis] + margin_m - origin_m[axis]) / side_m).ceil() as usize);
+        let mut distances_m = vec![f64::INFINITY; columns * rows];
+        let centre = |column: f64, row: f64| [origin_m[0] + column * side_m, origin_m[1] + row * side_m];
+        for first_row in (0..rows).step_by(BLOCK) {
+            for first_column in (0..columns).step_by(BLOCK) {
+                let half = 0.5 * BLOCK as f64;
+                let middle = centre(first_column as f64 + half, first_row as f64 + half);
+                let far: Vec<f64> = walls.iter().map(|wall| distance_m(middle, wall)).collect();
+                // No cell of the block is farther from its middle than half the diagonal.
+                let least = far.iter().copied().fold(f64::INFINITY, f64::min);
+                let most = least + 2.0 * half * side_m * std::f64::consts::SQRT_2;
+                let near: Vec<&[f64; 4]> =
+                    walls.iter().zip(&far).filter(|(_, far)| **far <= most).map(|(wall, _)| wall).collect();
+                for row in first_row..(first_row + BLOCK).min(rows) {
+                    for column in first_column..(first_column + BLOCK).min(columns) {
+                        let at = centre(column as f64 + 0.5, row as f64 + 0.5);
+                        distances_m[row * columns + column] =
+                            near.iter().map(|wall| distance_m(at, wall)).fold(f64::INFINITY, f64::min);
+                    }
+                }
+            }
+        }
+        Some(Self { origin_m, cell_m, columns, rows, distances_m })
     }
 
-    /// Probability at a point, interpolated between the centres of the four cells around it; unknown outside.
-    pub fn at(&self, [x_m, y_m]: [f64; 2]) -> f64 {
-        let column = (x_m - self.origin_m[0]) / self.cell_m - 0.5;
-        let row = (y_m - self.origin_m[1]) / self.cell_m - 0.5;
-        let (left, below) = (column.floor(), row.floor());
-        let (share_x, share_y) = (column - left, row - below);
+    /// Probability of a cell of the local grid with its centre at a point; unknown outside.
+    pub fn at(&self, point_m: [f64; 2]) -> f64 {
+        self.distance_m(point_m).map_or(UNKNOWN, |distance_m| occupancy(distance_m, self.cell_m))
+    }
+
+    /// From a point to the nearest wall, interpolated between the centres of the four cells around it; `None` outside.
+    pub fn distance_m(&self, [x_m, y_m]: [f64; 2]) -> Option<f64> {
+        let side_m = self.cell_m / FINER;
+        let column = (x_m - self.origin_m[0]) / side_m - 0.5;
+        let row = (y_m - self.origin_m[1]) / side_m - 0.5;
+        // Also false for what is not a number.
+        if !(column >= 0.0 && row >= 0.0) {
+            return None;
+        }
         // A cast of what is far outside saturates and stays outside.
-        #[allow(clippy::cast_possible_truncation)]
-        let (left, below) = (left as i64, below as i64);
-        let value =
-            |column: i64, row: i64| self.index([column, row]).map_or(UNKNOWN, |index| self.cells[index]);
-        let lower = (1.0 - share_x) * value(left, below) + share_x * value(left + 1, below);
-        let upper = (1.0 - share_x) * value(left, below + 1) + share_x * value(left + 1, below + 1);
-        (1.0 - share_y) * lower + share_y * upper
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let (left, below) = (column as usize, row as usize);
+        if left.saturating_add(1) >= self.columns || below.saturating_add(1) >= self.rows {
+            return None;
+        }
+        let (share_x, share_y) = (column - left as f64, row - below as f64);
+        let index = below * self.columns + left;
+        let lower = self.distances_m.get(index..index + 2)?;
+        let upper = self.distances_m.get(index + self.columns..index + self.columns + 2)?;
+        let lower = lower[0] + share_x * (lower[1] - lower[0]);
+        let upper = upper[0] + share_x * (upper[1] - upper[0]);
+        Some(lower + share_y * (upper - lower))
     }
 
-    /// The cell in a column and row, if it is in the grid.
-    fn index(&self, [column, row]: [i64; 2]) -> Option<usize> {
-        let (column, row) = (usize::try_from(column).ok()?, usize::try_from(row).ok()?);
-        (column < self.columns && row < self.rows).then_some(row * self.columns + column)
-    }
-
-    /// Probability of the cell in a column and row, if it is in the grid.
-    pub fn cell(&self, cell: [i64; 2]) -> Option<f64> {
-        self.index(cell).map(|index| self.cells[index])
+    /// Whether every point within `reach_m` of this one is in the grid and free.
+    pub(super) fn is_free_around(&self, point_m: [f64; 2], reach_m: f64) -> bool {
+        let side_m = self.cell_m / FINER;
+        let sides_m = [self.columns, self.rows].map(|count| count as f64 * side_m);
+        let inside = (0..2).all(|axis| {
+            let from_low_m = point_m[axis] - self.origin_m[axis];
+            from_low_m.min(sides_m[axis] - from_low_m) > reach_m + side_m
+        });
+        // Interpolation errs by less than a cell of this grid.
+        inside && self.distance_m(point_m).is_some_and(|far_m| far_m > reach_m + self.cell_m + side_m)
     }
 }
 
 /// From a point to a segment, metres.
-fn distance_m([x, y]: [f64; 2], &[x0, y0, x1, y1]: &[f64; 4]) -> f64 {
+pub(super) fn distance_m([x, y]: [f64; 2], &[x0, y0, x1, y1]: &[f64; 4]) -> f64 {
     let (along_x, along_y) = (x1 - x0, y1 - y0);
     let squared = along_x * along_x + along_y * along_y;
     let share = if squared > 0.0 { ((x - x0) * along_x + (y - y0) * along_y) / squared } else { 0.0 };
@@ -116,16 +150,36 @@ pub fn cells_on(from: [f64; 2], to: [f64; 2], origin_m: [f64; 2], cell_m: f64) -
     }
 }
 
+/// The sums of a match over pairs of cells of `G` and `G'`, `|A| = sum |a_ij|`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Match {
+    /// `|G - G'|`
+    apart: f64,
+    /// `|G - 1/2| + |G' - 1/2|`
+    known: f64,
+    /// `|G| + |G'|`
+    pub(super) seen: f64,
+}
+
+impl Match {
+    pub(super) fn add(&mut self, [ours, map]: [f64; 2]) {
+        self.apart += (ours - map).abs();
+        self.known += (ours - UNKNOWN).abs() + (map - UNKNOWN).abs();
+        self.seen += ours + map;
+    }
+
+    /// `f`, from 0 to 1. `None` if nothing is known of any cell, or if too little is seen.
+    pub(super) fn score(&self, mu_min: f64) -> Option<f64> {
+        (self.known > 0.0 && self.seen >= mu_min).then(|| 1.0 - self.apart / self.known)
+    }
+}
+
 /// `f = 1 - |G - G'| / (|G - 1/2| + |G' - 1/2|)` with `|A| = sum |a_ij|`, over pairs of cells of `G` and `G'`: from 0 to 1.
 /// `None` if nothing is known of any cell, or if `|G| + |G'|` is below `mu_min`: then there is too little to match.
 pub fn match_score(pairs: impl Iterator<Item = [f64; 2]>, mu_min: f64) -> Option<f64> {
-    let (mut apart, mut known, mut seen) = (0.0, 0.0, 0.0);
-    for [ours, map] in pairs {
-        apart += (ours - map).abs();
-        known += (ours - UNKNOWN).abs() + (map - UNKNOWN).abs();
-        seen += ours + map;
-    }
-    (known > 0.0 && seen >= mu_min).then(|| 1.0 - apart / known)
+    let mut sums = Match::default();
+    pairs.for_each(|pair| sums.add(pair));
+    sums.score(mu_min)
 }
 
 #[cfg(test)]
@@ -188,12 +242,23 @@ mod tests {
     fn walls_are_occupied_and_the_room_is_free() {
         let room = [[0.0, 0.0, 2.0, 0.0], [2.0, 0.0, 2.0, 1.0], [2.0, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]];
         let grid = Grid::of_walls(&room, 0.1, 0.2).unwrap();
-        assert!(grid.at([1.0, 0.5]) < 0.1 && grid.at([-5.0, 0.0]) == UNKNOWN);
-        // The lower wall is the border of two rows, half a cell from the centres of both; the next row is free.
-        for row in [1, 2] {
-            assert!((grid.cell([10, row]).unwrap() - 0.5 * (OCCUPIED + FREE)).abs() < 1e-9);
+        assert!(
+            grid.at([1.0, 0.5]) == 0.0
+                && grid.at([-5.0, 0.0]) == UNKNOWN
+                && grid.at([f64::NAN; 2]) == UNKNOWN
+        );
+        // A cell half a cell from the wall is half occupied, on both sides.
+        for y in [-0.05, 0.05] {
+            assert!((grid.at([1.0, y]) - 0.5).abs() < 1e-9);
         }
-        assert!((grid.cell([10, 3]).unwrap() - FREE).abs() < 1e-9);
+        assert!(grid.at([1.0, 0.1]) < 1e-9 && grid.at([1.0, 0.0]) > 0.85);
+        // Blocks know of every wall that is the nearest of one of their cells.
+        for step in 0..400 {
+            let at = [-0.15 + 0.0055 * f64::from(step), 1.1 - 0.003 * f64::from(step)];
+            let exact = room.iter().map(|wall| distance_m(at, wall)).fold(f64::INFINITY, f64::min);
+            assert!((grid.distance_m(at).unwrap() - exact).abs() < 0.025, "{at:?}");
+        }
+        assert!(grid.is_free_around([1.0, 0.5], 0.3) && !grid.is_free_around([1.0, 0.5], 0.45));
         assert!((distance_m([1.0, 2.0], &[0.0, 0.0, 3.0, 0.0]) - 2.0).abs() < 1e-15);
         assert!((distance_m([6.0, 4.0], &[0.0, 0.0, 3.0, 0.0]) - 5.0).abs() < 1e-15);
         assert!(Grid::of_walls(&[], 0.1, 0.2).is_none());

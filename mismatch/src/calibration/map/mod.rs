@@ -9,6 +9,7 @@
 mod calibrate;
 mod error;
 mod grid;
+mod matched;
 mod scan;
 
 pub use calibrate::{Drift, MapCalibration, MapOptions, Stretch, calibrate};
