@@ -15,8 +15,9 @@ use crate::table::load;
 pub(super) const FILE: &str = "recording.toml";
 
 /// The newest version of the folder that is read, and the one that is written. Version 1 is the format of
-/// the sample recordings; version 2 adds `velocity.csv`, `increment.csv` and further kinds of sighting.
-pub const FORMAT_VERSION: i64 = 2;
+/// the sample recordings; version 2 adds `velocity.csv`, `increment.csv` and further kinds of sighting; version 3
+/// `scan.csv`, `walls.csv` and `steer.csv`.
+pub const FORMAT_VERSION: i64 = 3;
 
 const UNITS: &str = "SI, radians";
 const EPOCH: &str = "common to the robots and the ground truth";

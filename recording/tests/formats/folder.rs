@@ -249,7 +249,7 @@ fn a_folder_copied_in_part_is_noticed_by_its_manifest() {
 fn a_manifest_that_is_not_understood_is_an_error_naming_the_key() {
     for (text, expected) in [
         ("", "key `format_version`: found nothing"),
-        ("format_version = 99", "key `format_version`: found `99`, expected a version from 1 to 2"),
+        ("format_version = 99", "key `format_version`: found `99`, expected a version from 1 to 3"),
         ("format_version = 1\nunits = \"feet\"", "key `units`: found `\"feet\"`, expected `\"SI, radians\"`"),
         ("format_version = 1\nname = 7", "key `name`: found `7`"),
         ("format_version = 1\nrobots = [\"r1\"]", "key `robots`"),
