@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use super::checkpoint::Checkpoint;
 use super::counts::FactCounts;
-use super::rules::{self, Closure};
+use super::rules::Closure;
 use super::views::{Term, Views};
 use super::{EarlierEntries, Ledger, Log};
 use crate::fact::{Entry, EntryId, Fingerprint, LogId, Seal, Vote, WHOLE};
@@ -199,11 +199,12 @@ impl Ledger {
     /// Whether a change is decided that cannot take effect here, because entries that it accepts are missing.
     pub fn lacks_accepted(&self) -> bool {
         let decided = self.closing.as_ref().and_then(|closing| closing.views.decided());
-        decided.is_some_and(|vote| vote.held.iter().any(|(log, held)| !self.holds_accepted(*log, *held)))
+        decided
+            .is_some_and(|vote| vote.held.iter().any(|(log, held)| !self.holds_accepted(vote, *log, *held)))
     }
 
     /// Whether all that is accepted of a log is held; its author may have said that it ends earlier.
-    fn holds_accepted(&self, log: LogId, held: u64) -> bool {
+    fn holds_accepted(&self, vote: &Vote, log: LogId, held: u64) -> bool {
         if held == WHOLE {
             let stay = self.views().into_iter().flat_map(Views::active).find(|term| term.robot == log.robot);
             let known = self.logs.keys().filter(|id| id.robot == log.robot && id.boot <= log.boot).copied();
@@ -211,7 +212,8 @@ impl Ledger {
             let of_stay = of_stay.map(|boot| LogId { robot: log.robot, boot: BootIndex(boot) });
             return known.chain(of_stay).all(|id| self.is_complete(id));
         }
-        self.holds(log, rules::needed(held, self.logs.get(&log).and_then(|log| log.limit)))
+        let ends = self.closing.as_ref().map_or(held, |closing| self.accepted_of(closing, vote, log, held));
+        self.holds(log, ends)
     }
 
     /// The membership as far as it is known here.

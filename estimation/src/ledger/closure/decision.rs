@@ -60,22 +60,27 @@ impl Ledger {
         }
     }
 
-    /// What is accepted of a log of one who goes reaches as far as his accepted seals let it, whatever those said
-    /// that are not accepted.
+    /// How much is accepted of a log of one who goes: what the change says, less where his accepted seals end it
+    /// earlier, whatever those said that are not accepted.
+    pub(super) fn accepted_of(&self, closing: &Closing, vote: &Vote, log: LogId, held: u64) -> u64 {
+        let seals = closing.seals.get(&log.robot).into_iter().flatten();
+        let accepted = seals.filter(|(seal, _)| accepts(vote, **seal)).flat_map(|(_, seal)| &seal.logs);
+        let said = accepted.filter(|named| named.last && named.boot == log.boot).map(|named| named.length);
+        let earlier = closing.base.logs.get(&log).and_then(|log| log.limit);
+        said.chain(earlier).fold(held, u64::min)
+    }
+
+    /// Ends that were not accepted end the logs of who goes no longer. What somebody has forgotten, being whole, has
+    /// ended where its author said.
     fn reopen_accepted(&mut self, vote: &Vote) {
         let Some(closing) = &self.closing else { return };
-        let (base, seals) = (&closing.base, &closing.seals);
-        let reopened = self.logs.iter_mut().filter(|(id, _)| vote.removed.contains(&id.robot));
-        for (id, log) in reopened {
-            let (Some(known), Some(held)) = (log.limit, length_of(&vote.held, *id)) else { continue };
-            let accepted =
-                seals.get(&id.robot).into_iter().flatten().filter(|(seal, _)| accepts(vote, **seal));
-            let named = accepted.flat_map(|(_, seal)| &seal.logs);
-            let said = named.filter(|named| named.last && named.boot == id.boot).map(|named| named.length);
-            let earlier = base.logs.get(id).and_then(|log| log.limit);
-            // What somebody has forgotten, being whole, has ended where its author said.
-            let ends = said.chain(earlier).fold(held, u64::min);
-            if held != WHOLE && ends > known {
+        let stated = vote.held.iter().filter(|(_, held)| *held != WHOLE);
+        let ends: Vec<(LogId, u64)> =
+            stated.map(|(log, held)| (*log, self.accepted_of(closing, vote, *log, *held))).collect();
+        for (id, ends) in ends {
+            if let Some(log) =
+                self.logs.get_mut(&id).filter(|log| log.limit.is_some_and(|limit| limit < ends))
+            {
                 log.limit = Some(ends);
             }
         }
@@ -87,7 +92,7 @@ impl Ledger {
             let Some(closing) = &self.closing else { return };
             let Some(vote) = closing.views.decided().cloned() else { return };
             self.reopen_accepted(&vote);
-            if !vote.held.iter().all(|(log, held)| self.holds_accepted(*log, *held)) {
+            if !vote.held.iter().all(|(log, held)| self.holds_accepted(&vote, *log, *held)) {
                 return;
             }
             let Some(closing) = &self.closing else { return };
