@@ -212,7 +212,7 @@ impl Ledger {
             let of_stay = of_stay.map(|boot| LogId { robot: log.robot, boot: BootIndex(boot) });
             return known.chain(of_stay).all(|id| self.is_complete(id));
         }
-        let ends = self.closing.as_ref().map_or(held, |closing| self.accepted_of(closing, vote, log, held));
+        let ends = self.closing.as_ref().map_or(held, |closing| closing.accepted_of(vote, log, held));
         self.holds(log, ends)
     }
 

@@ -60,23 +60,13 @@ impl Ledger {
         }
     }
 
-    /// How much is accepted of a log of one who goes: what the change says, less where his accepted seals end it
-    /// earlier, whatever those said that are not accepted.
-    pub(super) fn accepted_of(&self, closing: &Closing, vote: &Vote, log: LogId, held: u64) -> u64 {
-        let seals = closing.seals.get(&log.robot).into_iter().flatten();
-        let accepted = seals.filter(|(seal, _)| accepts(vote, **seal)).flat_map(|(_, seal)| &seal.logs);
-        let said = accepted.filter(|named| named.last && named.boot == log.boot).map(|named| named.length);
-        let earlier = closing.base.logs.get(&log).and_then(|log| log.limit);
-        said.chain(earlier).fold(held, u64::min)
-    }
-
     /// Ends that were not accepted end the logs of who goes no longer. What somebody has forgotten, being whole, has
     /// ended where its author said.
     fn reopen_accepted(&mut self, vote: &Vote) {
         let Some(closing) = &self.closing else { return };
         let stated = vote.held.iter().filter(|(_, held)| *held != WHOLE);
         let ends: Vec<(LogId, u64)> =
-            stated.map(|(log, held)| (*log, self.accepted_of(closing, vote, *log, *held))).collect();
+            stated.map(|(log, held)| (*log, closing.accepted_of(vote, *log, *held))).collect();
         for (id, ends) in ends {
             if let Some(log) =
                 self.logs.get_mut(&id).filter(|log| log.limit.is_some_and(|limit| limit < ends))
@@ -125,6 +115,18 @@ impl Ledger {
                 }
             }
         }
+    }
+}
+
+impl Closing {
+    /// How much is accepted of a log of one who goes: what the change says, less where his accepted seals end it
+    /// earlier, whatever those said that are not accepted.
+    pub(super) fn accepted_of(&self, vote: &Vote, log: LogId, held: u64) -> u64 {
+        let seals = self.seals.get(&log.robot).into_iter().flatten();
+        let accepted = seals.filter(|(seal, _)| accepts(vote, **seal)).flat_map(|(_, seal)| &seal.logs);
+        let said = accepted.filter(|named| named.last && named.boot == log.boot).map(|named| named.length);
+        let earlier = self.base.logs.get(&log).and_then(|log| log.limit);
+        said.chain(earlier).fold(held, u64::min)
     }
 }
 
