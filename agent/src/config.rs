@@ -180,6 +180,8 @@ pub struct ClosingConfig {
     pub late_s: f64,
     /// A robot silent for longer is evicted by the majority; `None` to leave that to operators.
     pub evict_after_s: Option<f64>,
+    /// With so many items in memory this robot observes nothing more, and seals only where it holds back the others.
+    pub most_items: usize,
     /// The nominal trajectory begins anew that far from its origin, m,
     pub rebase_m: f64,
     /// and after that time, s.

@@ -61,6 +61,7 @@ fn full() -> Table {
         y_m = 1.0
         [ledger]
         evict_after_s = 1.0
+        most_items = 5000
         [faults]
         plan = 'faults.toml'
         origin_s = 0.0

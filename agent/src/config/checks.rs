@@ -143,11 +143,19 @@ impl LedgerSection {
                 expected: "every robot once",
             });
         }
+        if self.most_items == 0 {
+            return Err(ConfigError::Value {
+                key: "ledger.most_items".to_owned(),
+                found: self.most_items.to_string(),
+                expected: "a number above 0",
+            });
+        }
         let cell_ns = Timestamp::from_seconds(self.cell_s).0.max(1);
         Ok(ClosingConfig {
             closure: (!members.is_empty()).then_some(Closure { members, cell_ns }),
             late_s: self.late_s,
             evict_after_s: self.evict_after_s,
+            most_items: self.most_items,
             rebase_m: self.rebase_m,
             rebase_s: self.rebase_s,
         })

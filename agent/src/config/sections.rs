@@ -303,6 +303,9 @@ pub struct LedgerSection {
     /// A robot from which nothing was heard for longer is evicted by the majority of the others, s;
     /// without it only an operator evicts.
     pub evict_after_s: Option<f64>,
+    /// With so many items in memory (entries, facts, answers; 0.3 kB each) the robot observes nothing more until
+    /// some are closed.
+    pub most_items: usize,
     /// The nominal trajectory begins anew that far from its origin, m.
     pub rebase_m: f64,
     /// And after that time, s.
@@ -316,6 +319,7 @@ impl Default for LedgerSection {
             cell_s: 5.0,
             late_s: 2.0,
             evict_after_s: None,
+            most_items: 1_000_000,
             rebase_m: 300.0,
             rebase_s: 3600.0,
         }

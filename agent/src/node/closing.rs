@@ -29,6 +29,8 @@ pub(super) struct Membership {
     hashes: BTreeMap<Timestamp, Fingerprint>,
     /// Statuses in a row in which a peer was in the epoch that this ledger has reached.
     pub same_epoch: BTreeMap<RobotId, usize>,
+    /// How far the odometry of peers reaches, by their statuses.
+    pub odometry: BTreeMap<RobotId, Timestamp>,
     /// The latest epoch that a peer has reached.
     pub latest_epoch: u32,
     /// Statuses of peers since a vote was last heard.
@@ -58,10 +60,11 @@ impl Node {
         if self.ledger.closure().is_none() || self.superseded {
             return;
         }
-        // Every round promises, votes or closes something new; a few are always enough.
-        for _ in 0..8 {
+        // Every round promises, votes or closes something new; a few are always enough. What a vote decides may
+        // leave nothing of what this robot rests on: that is checked before it promises or closes anything with it.
+        for _ in 0..24 {
             self.check_membership();
-            let moved = self.vote() | self.seal() | self.close();
+            let moved = self.vote() || self.seal() || self.close();
             if !moved {
                 break;
             }
@@ -81,12 +84,21 @@ impl Node {
         robot: Option<RobotId>,
     ) -> Result<(), SampleRefusal> {
         self.check_begin(time)?;
+        if self.is_full() {
+            let (items, awaited) = (self.ledger.kept(), self.ledger.awaited());
+            return Err(SampleRefusal::LedgerFull { time, items, awaited });
+        }
         match robot {
             Some(robot) if self.ledger.pending_of(robot) >= MOST_UNANSWERED => {
                 Err(SampleRefusal::Unanswered { robot })
             }
             _ => Ok(()),
         }
+    }
+
+    /// Whether so much is kept that nothing may be added that can be left unsaid.
+    fn is_full(&self) -> bool {
+        self.ledger.kept() >= self.config.closing.most_items
     }
 
     fn seal(&mut self) -> bool {
@@ -104,10 +116,14 @@ impl Node {
         if until < trajectory.start() {
             until = Timestamp::MIN;
         }
-        let until = until.max(observed);
-        let answers = self.ledger.answerable().min(until).max(answered);
         // A new life says at once how much there is of the earlier ones: before, nobody relies on those.
         let begun = last.is_none() || self.ledger.sealed_in(self.config.robot) == Some(boot);
+        // Where another holds back every cut, a seal would be one more entry and close nothing.
+        if begun && !self.input_ended && self.is_full() && !self.ledger.is_awaited(self.config.robot) {
+            until = observed;
+        }
+        let until = until.max(observed);
+        let answers = self.ledger.answerable().min(until).max(answered);
         if (until, answers) == (observed, answered) && begun {
             return false;
         }
@@ -191,6 +207,9 @@ impl Node {
         self.membership.quiet_statuses += 1;
         self.membership.latest_epoch = self.membership.latest_epoch.max(theirs.epoch);
         self.hear_epoch(peer, theirs.epoch);
+        if let Some(until) = status.odometry_until {
+            self.membership.odometry.insert(peer, until);
+        }
         // Whoever has been evicted without knowing yet may have closed with its own last words.
         let epoch = self.ledger.views().map_or(0, |views| views.epoch);
         if let Some((cut, hash)) = theirs.cut

@@ -182,7 +182,10 @@ impl Node {
         let mut long_absent = BTreeSet::new();
         for term in views.active().filter(|term| term.robot != self.config.robot) {
             let sealed = self.ledger.seal_of(term.robot).map_or(Timestamp::MIN, |seal| seal.observed);
-            let heard = sealed.max(term.from).max(self.first_odometry.unwrap_or(Timestamp::MIN));
+            // Whoever takes part in a ballot seals nothing before it ends, but is not silent.
+            let waits = views.held_back(term.robot).and_then(|_| self.membership.odometry.get(&term.robot));
+            let heard = sealed.max(term.from).max(waits.copied().unwrap_or(Timestamp::MIN));
+            let heard = heard.max(self.first_odometry.unwrap_or(Timestamp::MIN));
             let silent_s = trajectory.end().0.seconds_since(heard);
             if silent_s > limit_s {
                 long_absent.insert(term.robot);

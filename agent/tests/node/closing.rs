@@ -103,6 +103,40 @@ fn who_is_evicted_keeps_what_is_accepted_of_it_and_after_a_restart_too() {
 }
 
 #[test]
+fn with_the_other_away_memory_is_bounded_and_with_it_back_it_observes_again() {
+    let small = |robot| {
+        let mut config = closing(robot);
+        config.ledger.most_items = 60;
+        config
+    };
+    let (mut one, mut two) = (node_of(&small(1), 1), node_of(&small(2), 2));
+    let mut said = Vec::new();
+    let mut refusals = Vec::new();
+    for tenth in 0..2000 {
+        let (from, to) = (f64::from(tenth) * 0.1, f64::from(tenth) * 0.1 + 0.05);
+        let mut all = drive(&mut one, from, to, 0.1);
+        all.push(feed(&mut one, gps(to - 0.01)));
+        for handled in all {
+            let full = |notice: &Notice| notice.to_string().contains("ledger.most_items");
+            refusals.extend(handled.notices.into_iter().filter(full));
+            said.extend(handled.published);
+        }
+    }
+    // Every fix up to the limit was taken, with a fact each; nothing more came after, no seals either.
+    assert_eq!(one.ledger().kept(), 60);
+    let [Notice::SampleRefused(refusal)] = &refusals[..] else { panic!("{refusals:?}") };
+    let text = refusal.to_string();
+    assert!(text.contains("60 items") && text.contains("robot 2: bring it back or evict it"), "{text}");
+
+    let back = published(drive(&mut two, 0.0, 199.0, 0.1));
+    exchange(&mut one, &mut two, said);
+    exchange(&mut two, &mut one, back);
+    assert!(one.ledger().cut().expect("a cut").seconds() > 190.0, "{:?}", one.ledger().cut());
+    drive(&mut one, 200.0, 200.5, 0.1);
+    assert_eq!(feed(&mut one, gps(200.35)).published.len(), 1);
+}
+
+#[test]
 fn an_observation_in_a_sealed_time_is_refused() {
     let mut one = node_of(&closing(1), 1);
     drive(&mut one, 0.0, 10.0, 0.1);

@@ -66,6 +66,16 @@ pub enum SampleRefusal {
         /// Who was seen.
         robot: RobotId,
     },
+    /// As much is kept in memory as the configuration allows.
+    #[error("stamped {time}, when {items} items were kept, all that ledger.most_items allows; {}", remedy(*.awaited))]
+    LedgerFull {
+        /// Its stamp.
+        time: Timestamp,
+        /// Entries, facts and answers in memory.
+        items: usize,
+        /// Of a team that closes its past: whose promises reach least far.
+        awaited: Option<RobotId>,
+    },
     /// No noise is configured for the kind.
     #[error("no noise for {kind} in the configuration: add [sensors.{kind}]")]
     NoNoise {
@@ -81,6 +91,13 @@ pub enum SampleRefusal {
     /// A full pose of a landmark: a point has no heading.
     #[error("a full pose was reported of landmark {0}; a landmark has no heading")]
     LandmarkPose(LandmarkId),
+}
+
+fn remedy(awaited: Option<RobotId>) -> String {
+    awaited.map_or_else(
+        || "name the team in ledger.members, so that its past can be closed, or raise it".to_owned(),
+        |robot| format!("nothing is closed without robot {robot}: bring it back or evict it"),
+    )
 }
 
 /// How many samples were taken, and how many refused for which reason.

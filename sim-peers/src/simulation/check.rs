@@ -50,10 +50,17 @@ pub struct Checks {
     /// Robots that may have lost facts they had said.
     damaged: BTreeSet<RobotId>,
     pub most_kept: usize,
+    /// How many items a robot may keep, where that is limited.
+    most_allowed: Option<usize>,
     pub cuts: u64,
 }
 
 impl Checks {
+    /// With at most so many items in memory.
+    pub fn keeping(self, most_allowed: Option<usize>) -> Self {
+        Self { most_allowed, ..self }
+    }
+
     /// Without what grows with time: identities and estimates ever seen are not kept.
     pub fn for_long(self) -> Self {
         Self { forgetful: true, ..self }
@@ -109,6 +116,10 @@ impl Checks {
         let status = node.status();
         let ledger = node.ledger();
         self.most_kept = self.most_kept.max(ledger.kept());
+        if let Some(allowed) = self.most_allowed.filter(|allowed| ledger.kept() > *allowed) {
+            let what = format!("{} items are kept, {allowed} are allowed", ledger.kept());
+            return Err(self.violation(Some(robot), what));
+        }
         if let Some(problem) = not_a_covariance(ledger.joint()) {
             return Err(self.violation(Some(robot), problem));
         }
@@ -226,7 +237,9 @@ impl Checks {
                 }
             }
             for (robot, boot) in &vote.added {
-                ends.retain(|log, _| log.robot != *robot || log.boot < *boot);
+                // An older request may name a boot of which an eviction has accepted something since: that log is
+                // over all the same.
+                ends.retain(|log, end| log.robot != *robot || log.boot < *boot || *end > 0);
                 first_boots.insert(*robot, *boot);
             }
             members.retain(|robot| !vote.removed.contains(robot));

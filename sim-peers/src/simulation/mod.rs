@@ -31,4 +31,6 @@ pub struct Options {
     pub partitions_only: bool,
     /// Operators and majorities evict robots too.
     pub evictions: bool,
+    /// With so many items in memory a robot observes nothing more; else as by default.
+    pub most_items: Option<usize>,
 }

@@ -51,6 +51,8 @@ pub struct Plan {
     pub cell_s: Option<f64>,
     /// Robots silent for longer are evicted by the majority.
     pub evict_after_s: Option<f64>,
+    /// With so many items in memory a robot observes nothing more.
+    pub most_items: Option<usize>,
     /// The nominal trajectories begin anew that far from their origin, m.
     pub rebase_m: f64,
     /// What links do at first.
@@ -73,6 +75,7 @@ impl Plan {
             seconds,
             cell_s,
             evict_after_s: (chance.happens(0.15) && options.evictions).then_some(8.0),
+            most_items: options.most_items,
             rebase_m,
             weather: weather(&mut chance),
             blows: Vec::new(),
@@ -119,6 +122,14 @@ impl Plan {
             self.blows.push((begin + chance.between(1.0, 5.0), Blow::Evict { robot, at: other }));
             self.blows.push((begin + chance.between(6.0, 12.0), Blow::Heal));
         }
+    }
+
+    /// How many items a robot may ever keep. While a robot has observed `k` times it keeps at least `2 k` items, so
+    /// that with its last observation under the limit `M` it has made `M / 2`; each can become an entry with its
+    /// answer and the fact: four items of every robot. Besides, votes and boots.
+    pub fn most_allowed(&self) -> Option<usize> {
+        let robots = usize::try_from(self.robots).unwrap_or(usize::MAX);
+        self.most_items.map(|items| robots * (2 * items + 100))
     }
 
     /// Whether facts that were published can be lost for good.

@@ -116,7 +116,7 @@ impl<'a> Run<'a> {
             due: BTreeMap::new(),
             count: 0,
             chance: Chance::new(seed, 4),
-            checks: Checks::new(plan.robots),
+            checks: Checks::new(plan.robots).keeping(plan.most_allowed()),
             outcome: Outcome { robots: plan.robots, ..Outcome::default() },
             plan,
         }

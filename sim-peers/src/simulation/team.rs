@@ -23,6 +23,7 @@ pub struct World {
 /// The configuration of a robot of the team, or what is wrong with the plan's numbers.
 pub fn config(plan: &Plan, robot: u32, start: &Pose2) -> Result<NodeConfig, String> {
     let members: Vec<String> = (1..=plan.robots).map(|robot| robot.to_string()).collect();
+    let most = plan.most_items.map_or_else(String::new, |items| format!("most_items = {items}\n"));
     let ledger = plan.cell_s.map_or_else(String::new, |cell_s| {
         let evict = plan.evict_after_s.map_or_else(String::new, |s| format!("evict_after_s = {s:?}\n"));
         format!("members = [{}]\ncell_s = {cell_s:?}\n{evict}", members.join(","))
@@ -31,7 +32,7 @@ pub fn config(plan: &Plan, robot: u32, start: &Pose2) -> Result<NodeConfig, Stri
         "team = 'simulation'\nrobot = {robot}\n\
          prior = {{ x_m = {:?}, y_m = {:?}, heading_rad = {:?}, sigma_position_m = 0.1, sigma_heading_rad = 0.05 }}\n\
          landmarks = [{{ id = 7, x_m = 3.0, y_m = -4.0 }}]\n\
-         [ledger]\n{ledger}late_s = 0.5\nrebase_m = {:?}\n\
+         [ledger]\n{ledger}{most}late_s = 0.5\nrebase_m = {:?}\n\
          [motion]\nlongest_gap_s = 1.0\n\
          [sensors]\n\
          relative_pose = {{ sigma_position_m = 0.05, sigma_yaw_rad = 0.02 }}\n\

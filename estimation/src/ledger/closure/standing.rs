@@ -35,8 +35,13 @@ impl Ledger {
     /// Whether all is held that a robot said before its last seal, so that its votes are known.
     pub(super) fn holds_past(&self, closing: &Closing, robot: RobotId) -> bool {
         let named = closing.seals.get(&robot).into_iter().flatten().flat_map(|(_, seal)| &seal.logs);
-        let mut named = named.map(|log| (LogId { robot, boot: log.boot }, log.length));
-        named.all(|(id, length)| self.holds(id, rules::needed(length, self.end_of(closing, id))))
+        // Where it says that a log ends, nobody holds more, whether its word ends the log here or not.
+        let ends = |boot| named.clone().filter(move |log| log.last && log.boot == boot).map(|log| log.length);
+        named.clone().all(|log| {
+            let id = LogId { robot, boot: log.boot };
+            let said = ends(log.boot).chain(self.end_of(closing, id)).min();
+            self.holds(id, rules::needed(log.length, said))
+        })
     }
 
     /// Where a log ends, if it does: where its author has said so, and of who has gone, where what is accepted
@@ -114,6 +119,26 @@ impl Ledger {
         }
         let owed = self.unanswered(closing.owner).map(|(_, time)| time).min();
         closing.closure.floor(rules::answerable(members, owed))
+    }
+
+    /// Whether no member has promised less than this robot not to observe any more: then nothing is answered for
+    /// good, and so nothing closed, before it does.
+    pub fn is_awaited(&self, robot: RobotId) -> bool {
+        let standings = self.standings();
+        let observed = |standing: &Standing| standing.observed.max(standing.from);
+        let own = standings.iter().find(|(of, _)| *of == robot).map(|(_, standing)| observed(standing));
+        own.is_none_or(|own| standings.iter().all(|(_, standing)| own <= observed(standing)))
+    }
+
+    /// The member whose promises reach least far; `None` where nothing is ever closed.
+    pub fn awaited(&self) -> Option<RobotId> {
+        let reach = |standing: &Standing| (rules::final_until([*standing]), standing.observed);
+        self.standings().into_iter().min_by_key(|(_, standing)| reach(standing)).map(|(robot, _)| robot)
+    }
+
+    fn standings(&self) -> Vec<(RobotId, Standing)> {
+        let Some(closing) = &self.closing else { return Vec::new() };
+        closing.views.active().map(|term| (term.robot, self.standing(closing, term))).collect()
     }
 
     /// The latest cut that the seals held allow, if it is later than the last one.

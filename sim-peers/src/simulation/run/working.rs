@@ -56,6 +56,7 @@ pub fn operate(
         seconds: hours * 3600.0,
         cell_s: Some(5.0),
         evict_after_s: None,
+        most_items: None,
         rebase_m: 300.0,
         weather,
         blows,
