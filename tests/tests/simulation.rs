@@ -14,9 +14,10 @@ fn all(seeds: std::ops::Range<u64>, options: &Options) -> Vec<Outcome> {
                 (false, true) => " --evictions",
                 (false, false) => "",
             };
+            let most = options.most_items.map_or_else(String::new, |items| format!(" --most-items {items}"));
             panic!(
                 "seed {seed}: {violation}\nreplay: cargo run -p pleiad-tests --features planted \
-                 --example schedules -- --seeds {seed}..{}{kind}",
+                 --example schedules -- --seeds {seed}..{}{kind}{most}",
                 seed + 1
             )
         })
@@ -31,6 +32,16 @@ fn two_hundred_schedules_keep_every_invariant() {
     assert!(outcomes.iter().map(|outcome| outcome.cuts).sum::<u64>() > 1000);
     let outcomes = all(0..100, &Options::default());
     assert!(outcomes.iter().map(|outcome| outcome.deaths).sum::<u64>() > 50);
+}
+
+#[test]
+fn a_limit_on_items_in_memory_holds_and_changes_nothing_else() {
+    let free = Options { evictions: true, ..Options::default() };
+    let bounded = Options { most_items: Some(60), ..free.clone() };
+    let most = |outcomes: Vec<Outcome>| outcomes.iter().map(|outcome| outcome.most_kept).max().unwrap();
+    let (free, bounded) = (most(all(0..100, &free)), most(all(0..100, &bounded)));
+    // Every event was checked against the bound that a team of this size cannot exceed.
+    assert!(bounded < 500 && free > 700, "{bounded} {free}");
 }
 
 /// Seeds that have found a mistake in the rules, in the node or in the harness; `docs/ledger.md` says which.
