@@ -219,11 +219,16 @@ impl Ledger {
                 ready.push((next, fingerprint));
             }
         }
+        self.take_effect();
+        Insertion::Added { released }
+    }
+
+    /// Changes that are decided and can take effect do.
+    fn take_effect(&mut self) {
         self.decide();
         if std::mem::take(&mut self.truncated) {
             self.rebuild(None);
         }
-        Insertion::Added { released }
     }
 
     fn forget_if_empty(&mut self, log: LogId) {

@@ -251,6 +251,8 @@ impl Ledger {
         let checkpoint = self.checkpoint_at(closing, cut);
         let fingerprint = checkpoint.fingerprint();
         self.rest_on(checkpoint);
+        // What is closed is held, and a change may have waited for it.
+        self.take_effect();
         Some(fingerprint)
     }
 
