@@ -24,7 +24,7 @@ use crate::diagnosis::naming::NEAR_END;
 use crate::diagnosis::noise;
 use crate::diagnosis::spread::Explained;
 use crate::diagnosis::spread::check::{Check, LEAST_OF_TARGET};
-use crate::diagnosis::spread::density::{Student, log_sum};
+use crate::diagnosis::spread::density::{Student, log_sum_of};
 use crate::diagnosis::spread::family::{Family, Member, Place, Shown, Shows, blocks};
 use crate::diagnosis::spread::maximum::{Bounds, Density};
 use crate::diagnosis::term::Term;
@@ -74,6 +74,89 @@ struct Windows {
     blocks: Vec<usize>,
 }
 
+/// What commands may have done in a window: so many were lost, and what each wheel is off then, in sigmas.
+struct Case {
+    lost: f64,
+    errors: [f64; 2],
+    log_density: f64,
+}
+
+/// What is the same for every row.
+struct Weighed<'p> {
+    parameters: &'p [f64],
+    white: [f64; 2],
+    student: Student,
+    /// The logarithm of the probability that a command is not lost.
+    kept: f64,
+}
+
+impl<'p> Weighed<'p> {
+    fn new(parameters: &'p [f64]) -> Self {
+        Self {
+            parameters,
+            white: [0, 1].map(|part| libm::exp(2.0 * parameters[NOISE + part])),
+            student: Student::new(parameters[TAILS]),
+            kept: libm::log1p(-libm::exp(parameters[LOSS])),
+        }
+    }
+
+    fn sigma(&self, row: &Row) -> [f64; 2] {
+        let jitter = (self.parameters[JITTER] + row.declared_jitter_s.powi(2)) / 12.0;
+        [0, 1].map(|part: usize| (self.white[part] + jitter * row.agitation[part]).sqrt())
+    }
+
+    /// Writes what may have happened in a row, none, one or two commands lost, and gives its log-density.
+    fn cases(&self, row: &Row, cases: &mut Vec<Case>) -> f64 {
+        cases.clear();
+        let sigma = self.sigma(row);
+        let log_scales = libm::log(sigma[0] * sigma[1]);
+        let delay_s = self.parameters[DELAY];
+        let plain =
+            [0, 1].map(|part: usize| (row.residual[part] - delay_s * row.delayed[part]) / sigma[part]);
+        let mut add = |changes: [f64; 2], lost: f64, weight: f64| {
+            let errors = [0, 1].map(|part: usize| plain[part] - changes[part] / sigma[part]);
+            let log_density = self.student.log_density_by(errors, log_scales) + weight;
+            cases.push(Case { lost, errors, log_density });
+        };
+        let lost = self.parameters[LOSS];
+        if lost == f64::NEG_INFINITY || row.lost.is_empty() {
+            add([0.0; 2], 0.0, 0.0);
+        } else {
+            let count = row.lost.len() as f64;
+            add([0.0; 2], 0.0, count * self.kept);
+            for (index, one) in row.lost.iter().enumerate() {
+                add(*one, 1.0, lost + (count - 1.0) * self.kept);
+                for other in &row.lost[..index] {
+                    let both = [one[0] + other[0], one[1] + other[1]];
+                    add(both, 2.0, 2.0 * lost + (count - 2.0) * self.kept);
+                }
+            }
+        }
+        log_sum_of(cases.iter().map(|case| case.log_density))
+    }
+
+    /// The derivatives of the log-density of a row, which is `whole`, by the parameters before the weight of tails.
+    fn scores(&self, row: &Row, whole: f64, cases: &[Case]) -> [f64; TAILS] {
+        let sigma = self.sigma(row);
+        let odds = libm::exp(self.parameters[LOSS] - self.kept);
+        let mut scores = [0.0; TAILS];
+        for case in cases {
+            let share = if cases.len() == 1 { 1.0 } else { libm::exp(case.log_density - whole) };
+            for part in 0..2 {
+                let wider = share * self.student.slope(case.errors[part]) / (sigma[part] * sigma[part]);
+                scores[NOISE + part] += wider * self.white[part];
+                scores[JITTER] += wider * row.agitation[part] / 24.0;
+                let pulled = share * self.student.pull(case.errors[part]);
+                scores[DELAY] += pulled * row.delayed[part] / sigma[part];
+            }
+            if !row.lost.is_empty() {
+                scores[LOSS] += share * (case.lost - (row.lost.len() as f64 - case.lost) * odds);
+            }
+        }
+        scores
+    }
+}
+
 impl Density for Windows {
     fn rows(&self) -> usize {
         self.rows.len()
@@ -84,35 +167,24 @@ impl Density for Windows {
     }
 
     fn fill(&self, parameters: &[f64], into: &mut [f64]) {
-        let white = [0, 1].map(|component| libm::exp(2.0 * parameters[NOISE + component]));
-        let student = Student::new(parameters[TAILS]);
-        let lost = parameters[LOSS];
-        let kept = libm::log1p(-libm::exp(lost));
+        let weighed = Weighed::new(parameters);
+        let mut cases = Vec::new();
         for (row, value) in self.rows.iter().zip(into) {
-            let jitter = (parameters[JITTER] + row.declared_jitter_s.powi(2)) / 12.0;
-            let sigma = [0, 1].map(|part: usize| (white[part] + jitter * row.agitation[part]).sqrt());
-            let of = |changes: [f64; 2]| -> f64 {
-                let part = |part: usize| {
-                    let expected = parameters[DELAY] * row.delayed[part] + changes[part];
-                    student.log_density((row.residual[part] - expected) / sigma[part], sigma[part])
-                };
-                part(0) + part(1)
-            };
-            *value = of([0.0; 2]);
-            if lost == f64::NEG_INFINITY || row.lost.is_empty() {
-                continue;
-            }
-            let count = row.lost.len() as f64;
-            let mut sum = *value + count * kept;
-            for (index, one) in row.lost.iter().enumerate() {
-                sum = log_sum(sum, of(*one) + lost + (count - 1.0) * kept);
-                for other in &row.lost[..index] {
-                    let both = [one[0] + other[0], one[1] + other[1]];
-                    sum = log_sum(sum, of(both) + 2.0 * lost + (count - 2.0) * kept);
-                }
-            }
-            *value = sum;
+            *value = weighed.cases(row, &mut cases);
         }
+    }
+
+    /// Those of the weight of tails are to be differenced: their closed form loses its digits where there are none.
+    fn scores(&self, parameters: &[f64], free: &[usize]) -> Vec<Option<Vec<f64>>> {
+        let weighed = Weighed::new(parameters);
+        let mut all: Vec<[f64; TAILS]> = Vec::with_capacity(self.rows.len());
+        let mut cases = Vec::new();
+        for row in &self.rows {
+            let whole = weighed.cases(row, &mut cases);
+            all.push(weighed.scores(row, whole, &cases));
+        }
+        let of = |&index: &usize| (index < TAILS).then(|| all.iter().map(|own| own[index]).collect());
+        free.iter().map(of).collect()
     }
 
     /// A jitter and a loss are drawn anew for every command: neither they nor what they leave of a delay know the time,
