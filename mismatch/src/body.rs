@@ -85,6 +85,14 @@ impl Motion {
         truth_change(model, &self.body_window(track), self.stamps_s, state)
     }
 
+    /// Takes the state through the window.
+    pub(crate) fn pass<S: Scalar>(&self, track: &Track, model: &RobotModel<S>, state: &mut BodyState<S>) {
+        if !self.joined {
+            *state = BodyState::default();
+        }
+        body_state(model, &self.body_window(track), state);
+    }
+
     fn body_window<'t>(&self, track: &'t Track) -> BodyWindow<'t> {
         BodyWindow {
             track: &track.encoders[self.reach.clone()],
@@ -202,8 +210,7 @@ pub(crate) fn begun(track: &Track, plan: &Plan<Motion>, model: &RobotModel<f64>)
     let mut state = BodyState::default();
     let one = |own: &Motion| {
         let begun = if own.joined { state } else { BodyState::default() };
-        state = begun;
-        body_state(model, &own.body_window(track), &mut state);
+        own.pass(track, model, &mut state);
         begun
     };
     plan.items.iter().map(one).collect()
