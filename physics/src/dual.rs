@@ -67,6 +67,11 @@ impl<const P: usize> Scalar for Dual<P> {
     }
 
     #[inline]
+    fn is_constant(self) -> bool {
+        self.derivatives.iter().all(|own| *own == 0.0)
+    }
+
+    #[inline]
     fn chain(self, value: f64, derivative: f64) -> Self {
         let derivatives = if derivative.is_finite() {
             self.derivatives.map(|own| own * derivative)
