@@ -53,14 +53,13 @@ pub(super) fn slopes(unit: &Unit<'_>, terms: &[Term], requests: &[&Request], whi
                 }
             }
         };
-        match stretch.channel {
-            Channel::Body => {
-                let rows = body::around(track, &plans.body, &begun, &pushed, push_s);
-                rows.iter().for_each(|(row, values)| put(*row, values));
+        if stretch.channel == Channel::Body {
+            for (row, values) in body::around(track, &plans.body, &begun, &pushed, push_s) {
+                put(row, &values);
             }
-            _ => {
-                let rows = gyro::around(&plans.gyro, &begun, &pushed, push_s);
-                rows.iter().for_each(|(row, values)| put(*row, values));
+        } else {
+            for (row, values) in gyro::around(&plans.gyro, &begun, &pushed, push_s) {
+                put(row, &values);
             }
         }
         let shows = |part: &Vec<f64>| {
