@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use pleiad_estimation::RobotId;
 use pleiad_physics::chain::body::BodyState;
-use pleiad_physics::predict::{BodyWindow, truth_change};
+use pleiad_physics::predict::{BodyWindow, body_state, truth_change};
 use pleiad_physics::{ActiveEffect, Effect, Pose, RobotModel, Scalar, Surroundings};
 
 use crate::channel::Channel;
@@ -19,6 +19,9 @@ const WINDOW_S: f64 = 1.0;
 /// A push lasts so long, seconds: of one that a reference pose is taken in the midst of, the window before shows a
 /// part and the window after the rest.
 pub(crate) const PUSH_S: f64 = 0.04;
+/// A push this far from all that a window is made of, seconds, does not show in it: farther than a reference pose that
+/// it is split between is from the end of the window.
+const AROUND_S: f64 = 0.5;
 
 /// A window of the body.
 pub(crate) struct Motion {
@@ -79,14 +82,25 @@ impl Motion {
         model: &RobotModel<S>,
         state: &mut BodyState<S>,
     ) -> Pose<S> {
-        let window = BodyWindow {
+        truth_change(model, &self.body_window(track), self.stamps_s, state)
+    }
+
+    /// Takes the state through the window.
+    pub(crate) fn pass<S: Scalar>(&self, track: &Track, model: &RobotModel<S>, state: &mut BodyState<S>) {
+        if !self.joined {
+            *state = BodyState::default();
+        }
+        body_state(model, &self.body_window(track), state);
+    }
+
+    fn body_window<'t>(&self, track: &'t Track) -> BodyWindow<'t> {
+        BodyWindow {
             track: &track.encoders[self.reach.clone()],
             ends: [self.window.first, self.window.last].map(|end| end - self.reach.start),
             start: self.start,
             surroundings: self.surroundings,
             partner_m: track.partner_m.get(self.window.first..=self.window.last).unwrap_or_default(),
-        };
-        truth_change(model, &window, self.stamps_s, state)
+        }
     }
 }
 
@@ -189,6 +203,38 @@ pub(crate) fn residuals<S: Scalar>(
         channel.push(Residual::new(own.middle_s, own.regime, None, &values, &[]));
     }
     channel
+}
+
+/// The states of the body in which the windows of a plan begin.
+pub(crate) fn begun(track: &Track, plan: &Plan<Motion>, model: &RobotModel<f64>) -> Vec<BodyState<f64>> {
+    let mut state = BodyState::default();
+    let one = |own: &Motion| {
+        let begun = if own.joined { state } else { BodyState::default() };
+        own.pass(track, model, &mut state);
+        begun
+    };
+    plan.items.iter().map(one).collect()
+}
+
+/// The residuals of the windows around a push, which are all that it shows in, with their positions; `begun` are the
+/// states in which windows begin.
+pub(crate) fn around<S: Scalar>(
+    track: &Track,
+    plan: &Plan<Motion>,
+    begun: &[BodyState<f64>],
+    model: &RobotModel<S>,
+    push_s: f64,
+) -> Vec<(usize, [S; 3])> {
+    let near = |own: &Motion| {
+        let [from_s, to_s] = [own.reach.start, own.reach.end - 1].map(|end| track.encoders[end].time_s);
+        (from_s - AROUND_S..=to_s + AROUND_S).contains(&push_s)
+    };
+    let one = |(index, own): (usize, &Motion)| {
+        let predicted = own.predicted(track, model, &mut begun[index].lift());
+        (index, difference(&own.measured, &predicted))
+    };
+    let windows = plan.items.iter().take(begun.len()).enumerate();
+    windows.filter(|(_, own)| near(own)).map(one).collect()
 }
 
 /// Measured minus predicted: forward, left and yaw, in the frame that the robot has in the middle.

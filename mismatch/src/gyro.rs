@@ -6,7 +6,7 @@ use pleiad_estimation::RobotId;
 use pleiad_estimation::sample::Reading;
 use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::chain::sensors;
-use pleiad_physics::predict::{BodyWindow, EncoderSample, body_motion, mean_gyro};
+use pleiad_physics::predict::{BodyWindow, EncoderSample, body_state, mean_gyro};
 use pleiad_physics::{Context, Effect, Motion, Pose, RobotModel, Scalar, Surroundings};
 
 use crate::body::push_s;
@@ -103,23 +103,48 @@ pub(crate) fn plan(evidence: &Evidence<'_>, robot: RobotId) -> Plan<Stretch> {
 pub(crate) fn residuals<S: Scalar>(plan: &Plan<Stretch>, model: &RobotModel<S>) -> ChannelResiduals<S> {
     let mut channel = ChannelResiduals::planned(Channel::Gyro, plan);
     let mut state = BodyState::default();
-    let unpushed = push_s(model).map(|_| {
+    let unpushed = unpushed(model);
+    for own in &plan.items {
+        own.begin(model, &mut state);
+        let value = own.residual(model, unpushed.as_ref(), &mut state);
+        let sigma = sigma(model, own);
+        channel.push(Residual::new(own.middle_s, own.regime, None, &[value], &[sigma]));
+    }
+    channel
+}
+
+/// The model without pushes, if it has any.
+fn unpushed<S: Scalar>(model: &RobotModel<S>) -> Option<RobotModel<S>> {
+    push_s(model).map(|_| {
         let mut unpushed = model.clone();
         unpushed.effects.retain(|active| active.effect() != Effect::Push);
         unpushed
-    });
-    for own in &plan.items {
-        let window = |samples| BodyWindow::whole(samples, own.start, own.surroundings);
-        match &own.before {
-            Some(before) => {
-                body_motion(model, &window(before), &mut state);
-            }
-            None => state = BodyState::default(),
+    })
+}
+
+impl Stretch {
+    fn window<'w>(&self, samples: &'w [EncoderSample]) -> BodyWindow<'w> {
+        BodyWindow::whole(samples, self.start, self.surroundings)
+    }
+
+    /// Takes the state of the body from the window before to this one.
+    fn begin<S: Scalar>(&self, model: &RobotModel<S>, state: &mut BodyState<S>) {
+        match &self.before {
+            Some(before) => body_state(model, &self.window(before), state),
+            None => *state = BodyState::default(),
         }
-        let begun = state;
-        let mut value = -mean_gyro(model, &window(&own.wheels), &mut state) + own.measured;
-        if let Some(unpushed) = &unpushed {
-            let without = -mean_gyro(unpushed, &window(&own.wheels), &mut begun.clone()) + own.measured;
+    }
+
+    fn residual<S: Scalar>(
+        &self,
+        model: &RobotModel<S>,
+        unpushed: Option<&RobotModel<S>>,
+        state: &mut BodyState<S>,
+    ) -> S {
+        let mut begun = *state;
+        let mut value = -mean_gyro(model, &self.window(&self.wheels), state) + self.measured;
+        if let Some(unpushed) = unpushed {
+            let without = -mean_gyro(unpushed, &self.window(&self.wheels), &mut begun) + self.measured;
             let pushed = value - without;
             for seen in [without, without + pushed * 2.0] {
                 if pushed.value() != 0.0 && seen.value().abs() < value.value().abs() {
@@ -127,10 +152,40 @@ pub(crate) fn residuals<S: Scalar>(plan: &Plan<Stretch>, model: &RobotModel<S>) 
                 }
             }
         }
-        let sigma = sigma(model, own);
-        channel.push(Residual::new(own.middle_s, own.regime, None, &[value], &[sigma]));
+        value
     }
-    channel
+}
+
+/// The states of the body in which the windows of a plan begin.
+pub(crate) fn begun(plan: &Plan<Stretch>, model: &RobotModel<f64>) -> Vec<BodyState<f64>> {
+    let mut state = BodyState::default();
+    let one = |own: &Stretch| {
+        own.begin(model, &mut state);
+        let begun = state;
+        body_state(model, &own.window(&own.wheels), &mut state);
+        begun
+    };
+    plan.items.iter().map(one).collect()
+}
+
+/// The residuals of the windows that a push falls into, which are all that it shows in, with their positions; `begun`
+/// are the states in which windows begin.
+pub(crate) fn around<S: Scalar>(
+    plan: &Plan<Stretch>,
+    begun: &[BodyState<f64>],
+    model: &RobotModel<S>,
+    push_s: f64,
+) -> Vec<(usize, [S; 1])> {
+    let unpushed = unpushed(model);
+    let near = |own: &Stretch| {
+        let ends = own.wheels.first().zip(own.wheels.last());
+        ends.is_some_and(|(first, last)| (first.time_s..=last.time_s).contains(&push_s))
+    };
+    let one = |(index, own): (usize, &Stretch)| {
+        (index, [own.residual(model, unpushed.as_ref(), &mut begun[index].lift())])
+    };
+    let windows = plan.items.iter().take(begun.len()).enumerate();
+    windows.filter(|(_, own)| near(own)).map(one).collect()
 }
 
 /// That of the mean: the white noise of the readings, and what a walking bias has gained since the first.

@@ -31,6 +31,7 @@ mod reference;
 mod residual;
 mod rollout;
 mod schedule;
+mod search;
 mod sensors;
 mod sightings;
 mod summary;

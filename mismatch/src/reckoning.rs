@@ -3,6 +3,8 @@
 use pleiad_physics::predict::Path;
 use pleiad_physics::{Motion, Pose};
 
+use crate::search::first_not;
+
 /// One sample of odometry.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Step {
@@ -56,21 +58,38 @@ impl Reckoning {
     /// Odometry is nearly free of noise, so it may be interpolated. `None` outside the samples and in a
     /// pause.
     pub(crate) fn at(&self, time_s: f64) -> Option<Reckoned> {
-        let after = self.times_s.partition_point(|stamp_s| *stamp_s <= time_s);
+        let (step, reckoned, share) = self.within(time_s)?;
+        Some(if share > 0.0 { advanced(reckoned, step, share) } else { *reckoned })
+    }
+
+    /// How far it has driven (metres) and turned (radians): the same without the pose.
+    pub(crate) fn travelled(&self, time_s: f64) -> Option<(f64, f64)> {
+        let (step, reckoned, share) = self.within(time_s)?;
+        Some((reckoned.path_m + share * step.forward_m, reckoned.pose.yaw_rad + share * step.yaw_rad))
+    }
+
+    /// The step that an instant lies in, and which share of it has passed.
+    fn within(&self, time_s: f64) -> Option<(&Step, &Reckoned, f64)> {
+        let after = self.after(time_s);
         let (step, reckoned) = self.steps.get(after.checked_sub(1)?)?;
         let since_s = time_s - step.time_s;
         if since_s <= 0.0 {
-            return Some(*reckoned);
+            return Some((step, reckoned, 0.0));
         }
         let step_s = self.times_s.get(after)? - step.time_s;
-        (step_s <= self.pause_s).then(|| advanced(reckoned, step, since_s / step_s))
+        (step_s <= self.pause_s).then_some((step, reckoned, since_s / step_s))
+    }
+
+    /// The position of the first sample after an instant.
+    fn after(&self, time_s: f64) -> usize {
+        first_not(&self.times_s, |stamp_s| *stamp_s, time_s, |stamp_s| stamp_s <= time_s)
     }
 }
 
 impl Path for Reckoning {
     /// Between samples the velocity is constant.
     fn motion_at(&self, time_s: f64) -> Option<Motion<f64>> {
-        let after = self.times_s.partition_point(|stamp_s| *stamp_s <= time_s);
+        let after = self.after(time_s);
         let (step, reckoned) = self.steps.get(after.checked_sub(1)?)?;
         let step_s = self.times_s.get(after)? - step.time_s;
         if step_s > self.pause_s {

@@ -1,5 +1,7 @@
 //! How far a prediction is off after a while.
 
+use std::ops::Range;
+
 use pleiad_estimation::RobotId;
 use pleiad_physics::chain::body::BodyState;
 use pleiad_physics::{Pose, RobotModel, Scalar};
@@ -33,8 +35,14 @@ pub fn rollouts(
     model: &RobotModel<f64>,
     horizons_s: &[f64],
 ) -> Vec<Vec<Rollout>> {
-    Planned::new(evidence, robot, horizons_s).rollouts(evidence, robot, model)
+    Planned::new(evidence, robot, horizons_s).rollouts(evidence, robot, model, &ALWAYS)
 }
+
+/// Of roll-outs that begin at any time.
+pub(crate) const ALWAYS: Range<f64> = f64::NEG_INFINITY..f64::INFINITY;
+/// Before the first roll-out the state of the body is followed for so long, seconds: what it remembers from earlier is
+/// the last step, and a castor that has swung round since.
+const REMEMBERED_S: f64 = 60.0;
 
 /// The windows of roll-outs over several horizons: they depend on no model.
 pub(crate) struct Planned(Vec<Over>);
@@ -61,12 +69,13 @@ impl Planned {
         Self(horizons_s.iter().map(over).collect())
     }
 
-    /// Per horizon.
+    /// Those that begin within a time, per horizon.
     pub(crate) fn rollouts(
         &self,
         evidence: &Evidence<'_>,
         robot: RobotId,
         model: &RobotModel<f64>,
+        within: &Range<f64>,
     ) -> Vec<Vec<Rollout>> {
         let Some((_, track)) = evidence.robot(robot) else { return vec![Vec::new(); self.0.len()] };
         let over = |over: &Over| match over {
@@ -76,15 +85,23 @@ impl Planned {
                 let one = |own: &commanded::Motion| {
                     end_error(own.window.from_s, &own.measured, &driver.predicted(model, own))
                 };
-                plan.items.iter().map(one).collect()
+                let all = plan.items.iter().map(one);
+                all.filter(|rollout| within.contains(&rollout.time_s)).collect()
             }
             Over::Encoders(plan) => {
                 let mut state = BodyState::default();
                 let one = |own: &body::Motion| {
                     let from_s = track.encoders[own.window.first].time_s;
-                    end_error(from_s, &own.measured, &own.predicted(track, model, &mut state))
+                    if within.contains(&from_s) {
+                        let predicted = own.predicted(track, model, &mut state);
+                        return Some(end_error(from_s, &own.measured, &predicted));
+                    }
+                    if (within.start - REMEMBERED_S..within.end).contains(&from_s) {
+                        own.pass(track, model, &mut state);
+                    }
+                    None
                 };
-                plan.items.iter().map(one).collect()
+                plan.items.iter().filter_map(one).collect()
             }
         };
         self.0.iter().map(over).collect()

@@ -12,6 +12,7 @@ use pleiad_recording::RobotRecording;
 
 use crate::reckoning::{Reckoned, Reckoning};
 use crate::residual::{Omission, Regime};
+use crate::search::first_not;
 use crate::windows::Window;
 pub(crate) use recorded::median_step;
 use recorded::{
@@ -130,7 +131,7 @@ impl Track {
     /// The wheels' angles at an instant: encoders are nearly free of noise, so they may be interpolated, with
     /// the acceleration between the steps before and after. `None` outside the samples and in a pause.
     pub(crate) fn wheels_at(&self, time_s: f64) -> Option<EncoderSample> {
-        let after = self.encoders.partition_point(|sample| sample.time_s <= time_s);
+        let after = first_not(&self.encoders, |sample| sample.time_s, time_s, |stamp_s| stamp_s <= time_s);
         let before = *self.encoders.get(after.checked_sub(1)?)?;
         let since_s = time_s - before.time_s;
         if since_s <= 0.0 {
@@ -217,15 +218,15 @@ impl Track {
         let (first_s, last_s) = self.reckoning.span_s()?;
         let from_s = (time_s - VELOCITY_REACH_S).max(first_s);
         let to_s = (time_s + VELOCITY_REACH_S).min(last_s);
-        let (from, to) = (self.reckoned_at(from_s)?, self.reckoned_at(to_s)?);
+        let (from, to) = (self.reckoning.travelled(from_s)?, self.reckoning.travelled(to_s)?);
         let lasted_s = to_s - from_s;
-        let rates = ((to.path_m - from.path_m) / lasted_s, (to.pose.yaw_rad - from.pose.yaw_rad) / lasted_s);
+        let rates = ((to.0 - from.0) / lasted_s, (to.1 - from.1) / lasted_s);
         (lasted_s > 0.0).then_some(rates)
     }
 
     /// The truth sample with the nearest stamp, and its stamp. `None` where none is near.
     pub(crate) fn truth_near(&self, time_s: f64) -> Option<(f64, Pose<f64>)> {
-        let after = self.truth.partition_point(|(stamp_s, _)| *stamp_s < time_s);
+        let after = first_not(&self.truth, |(stamp_s, _)| *stamp_s, time_s, |stamp_s| stamp_s < time_s);
         let near = [after.checked_sub(1), Some(after)].into_iter().flatten();
         let nearest = near
             .filter_map(|index| self.truth.get(index))

@@ -67,6 +67,11 @@ impl<const P: usize> Scalar for Dual<P> {
     }
 
     #[inline]
+    fn is_constant(self) -> bool {
+        self.derivatives.iter().all(|own| *own == 0.0)
+    }
+
+    #[inline]
     fn chain(self, value: f64, derivative: f64) -> Self {
         let derivatives = if derivative.is_finite() {
             self.derivatives.map(|own| own * derivative)
@@ -88,23 +93,64 @@ impl<const P: usize> Neg for Dual<P> {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
-        self.chain(-self.value, -1.0)
+        Self { value: -self.value, derivatives: self.derivatives.map(|own| -own) }
     }
 }
 
 impl<const P: usize> Add for Dual<P> {
     type Output = Self;
     #[inline]
-    fn add(self, other: Self) -> Self {
-        Self::combined(self.value + other.value, &self, 1.0, &other, 1.0)
+    fn add(mut self, other: Self) -> Self {
+        self += other;
+        self
     }
 }
 
 impl<const P: usize> Sub for Dual<P> {
     type Output = Self;
     #[inline]
-    fn sub(self, other: Self) -> Self {
-        Self::combined(self.value - other.value, &self, 1.0, &other, -1.0)
+    fn sub(mut self, other: Self) -> Self {
+        self -= other;
+        self
+    }
+}
+
+impl<const P: usize> AddAssign for Dual<P> {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        self.value += other.value;
+        for (own, other) in self.derivatives.iter_mut().zip(other.derivatives) {
+            *own += other;
+        }
+    }
+}
+
+impl<const P: usize> SubAssign for Dual<P> {
+    #[inline]
+    fn sub_assign(&mut self, other: Self) {
+        self.value -= other.value;
+        for (own, other) in self.derivatives.iter_mut().zip(other.derivatives) {
+            *own -= other;
+        }
+    }
+}
+
+/// A constant added changes no derivative.
+impl<const P: usize> Add<f64> for Dual<P> {
+    type Output = Self;
+    #[inline]
+    fn add(mut self, other: f64) -> Self {
+        self.value += other;
+        self
+    }
+}
+
+impl<const P: usize> Sub<f64> for Dual<P> {
+    type Output = Self;
+    #[inline]
+    fn sub(mut self, other: f64) -> Self {
+        self.value -= other;
+        self
     }
 }
 
@@ -138,8 +184,6 @@ macro_rules! with_number {
     )*};
 }
 with_number! {
-    Add add |_| 1.0;
-    Sub sub |_| 1.0;
     Mul mul |other| other;
     Div div |other| 1.0 / other;
 }
@@ -155,8 +199,6 @@ macro_rules! in_place {
     )*};
 }
 in_place! {
-    AddAssign add_assign +;
-    SubAssign sub_assign -;
     MulAssign mul_assign *;
     DivAssign div_assign /;
 }

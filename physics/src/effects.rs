@@ -91,6 +91,12 @@ impl Effect {
         Self::ALL.iter().copied().find(|effect| effect.info().name == name)
     }
 
+    /// Whether what it does to the motion of the body, or to the gyro, depends on where the robot is or where it
+    /// heads: without such an effect nobody need know the pose in the middle of a step.
+    pub(crate) const fn places_body(self) -> bool {
+        matches!(self, Self::LowFrictionPatch | Self::PartnerInfluence)
+    }
+
     /// The name in findings, scenarios and model files.
     pub const fn name(self) -> &'static str {
         self.info().name

@@ -174,6 +174,11 @@ impl<S: Scalar> RobotModel<S> {
         self
     }
 
+    /// Whether an effect on the motion of the body, or on the gyro, depends on where the robot is or where it heads.
+    pub(crate) fn places_body(&self) -> bool {
+        self.effects.iter().any(|active| active.effect.places_body() || active.scope.region.is_some())
+    }
+
     /// Calls `hook` with every effect whose scope contains the context.
     #[inline]
     pub fn apply(&self, context: &Context<S>, mut hook: impl FnMut(Effect, &[S])) {

@@ -113,9 +113,36 @@ impl<S: Scalar> Pose<S> {
         Self::new(a * forward_m - b * left_m, b * forward_m + a * left_m, yaw_rad)
     }
 
+    /// The group product, in plain numbers where neither depends on anything: most of what carries a reference pose.
+    pub(crate) fn compose_plainly(&self, other: &Self) -> Self {
+        if self.is_constant() && other.is_constant() {
+            return self.value().compose(&other.value()).lift();
+        }
+        self.compose(other)
+    }
+
+    /// `self^-1`: the outer frame seen from this one; in plain numbers where it depends on nothing.
+    pub(crate) fn inverse(&self) -> Self {
+        if self.is_constant() {
+            return self.value().between(&Pose::identity()).lift();
+        }
+        self.between(&Self::identity())
+    }
+
+    fn is_constant(&self) -> bool {
+        [self.x_m, self.y_m, self.yaw_rad].into_iter().all(S::is_constant)
+    }
+
     /// The values without their derivatives.
     pub fn value(&self) -> Pose<f64> {
         Pose::new(self.x_m.value(), self.y_m.value(), self.yaw_rad.value())
+    }
+}
+
+impl Pose<f64> {
+    /// The same pose as another scalar, depending on nothing.
+    pub fn lift<S: Scalar>(&self) -> Pose<S> {
+        Pose::constant(self.x_m, self.y_m, self.yaw_rad)
     }
 }
 

@@ -35,6 +35,9 @@ pub trait Scalar:
     /// The value without its derivatives.
     fn value(self) -> f64;
 
+    /// Whether it depends on nothing.
+    fn is_constant(self) -> bool;
+
     /// A function of one argument by its value and its derivative at that argument.
     ///
     /// Every elementary function goes through here; a derivative of zero never multiplies into `NaN`.
@@ -194,6 +197,11 @@ impl Scalar for f64 {
     #[inline]
     fn value(self) -> f64 {
         self
+    }
+
+    #[inline]
+    fn is_constant(self) -> bool {
+        true
     }
 
     #[inline]

@@ -12,6 +12,7 @@ use crate::diagnosis::starts::{Placing, Start, onsets, regions, starts};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Column, Row, Stretch, Unit};
+use crate::parallel;
 
 /// An impulse is looked for at so many of the largest residuals.
 const IMPULSES: usize = 8;
@@ -109,14 +110,19 @@ pub(crate) fn candidates(
     // An impulse shows only if it is at an instant that was recorded.
     let (mut instant_owners, mut instants) = (Vec::new(), Vec::new());
     let columns = linearized(units, terms, states, &requests);
-    for ((owner, request), columns) in owners.into_iter().zip(&requests).zip(columns) {
-        let entry = entries[owner];
+    let shown_of = requests.iter().zip(columns).map(|(request, columns)| shown(request, columns));
+    let shown_of: Vec<(usize, Option<Candidate>)> = owners.into_iter().zip(shown_of).collect();
+    let expanded = parallel::map(&shown_of, |(owner, everywhere)| {
+        let entry = entries[*owner];
         let placing = Placing::of(entry.0.info());
-        match (shown(request, columns), placing.onset) {
-            (Some(candidate), _) if !placing.is_some() => found[owner].push(candidate),
-            (Some(everywhere), _) => {
-                found[owner].extend(placed(&everywhere, placing, units, (&acting(entry), states)));
-            }
+        let everywhere = everywhere.as_ref().filter(|_| placing.is_some())?;
+        Some(placed(everywhere, placing, units, (&acting(entry), states)))
+    });
+    for (((owner, shown), request), expanded) in shown_of.into_iter().zip(&requests).zip(expanded) {
+        let entry = entries[owner];
+        match (shown.map(|plain| expanded.unwrap_or_else(|| vec![plain])), Placing::of(entry.0.info()).onset)
+        {
+            (Some(candidates), _) => found[owner].extend(candidates),
             (None, Some(onset)) => {
                 for time_s in largest(entry.0, &own(entry), units, states) {
                     let mut term = request.term.clone();

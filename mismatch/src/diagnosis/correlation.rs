@@ -60,8 +60,22 @@ struct Row {
     kw: f64,
 }
 
+/// Products of spreads that are far from what a number can hold.
+const HELD: std::ops::Range<f64> = 1e-200..1e200;
+
+/// What is kept from each value to the next of what lasts for so many steps.
+fn kept(lasts: f64, chain: &Chain) -> Vec<f64> {
+    chain.steps.iter().map(|steps| libm::exp(-steps / lasts)).collect()
+}
+
 impl Correlation {
+    #[cfg(test)]
     pub(super) fn new(shape: Shape, chain: &Chain) -> Self {
+        Self::kept(shape, chain, &kept(shape.lasts, chain))
+    }
+
+    /// The same from what is kept of what lasts.
+    fn kept(shape: Shape, chain: &Chain, kept: &[f64]) -> Self {
         let rho = shape.theta / (1.0 + shape.theta * shape.theta);
         let count = chain.steady.len();
         let mut rows = Vec::with_capacity(count);
@@ -76,7 +90,7 @@ impl Correlation {
             let (k0, k1, k2) = (h * zz + b * zw, h * zw + b * ww, d);
             let variance = h * k0 + b * k1 + d * k2;
             let s = variance.sqrt();
-            let f = chain.steps.get(t).map_or(0.0, |steps| libm::exp(-steps / shape.lasts));
+            let f = kept.get(t).copied().unwrap_or(0.0);
             rows.push(Row { h, b, s, f, kz: f * k0 / s, kw: k2 / s });
             let posterior = zz - k0 * k0 / variance;
             zz = f * f * posterior + 1.0 - f * f;
@@ -99,20 +113,22 @@ impl Correlation {
         let theta = |step: u32| MOST_SHARED * f64::from(step) / f64::from(SHARED_STEPS);
         let plain = |theta| Shape { theta, share: 0.0, lasts: 1.0 };
         let mut best: Option<(f64, Shape, Self)> = None;
-        let mut take = |shape: Shape| {
-            let own = Self::new(shape, chain);
+        let mut take = |shape: Shape, kept: &[f64]| {
+            let own = Self::kept(shape, chain, kept);
             let likelihood = own.log_likelihood(values);
             if likelihood.is_finite() && best.as_ref().is_none_or(|(most, ..)| likelihood > *most) {
                 best = Some((likelihood, shape, own));
             }
         };
+        let nothing = kept(plain(0.0).lasts, chain);
         for step in 0..=SHARED_STEPS {
-            take(plain(theta(step)));
+            take(plain(theta(step)), &nothing);
         }
+        let lasting = LASTS.map(|lasts| (lasts, kept(lasts, chain)));
         for share in SHARES {
-            for lasts in LASTS {
+            for (lasts, kept) in &lasting {
                 for step in (0..=SHARED_STEPS).step_by(COARSE) {
-                    take(Shape { theta: theta(step), share, lasts });
+                    take(Shape { theta: theta(step), share, lasts: *lasts }, kept);
                 }
             }
         }
@@ -121,7 +137,16 @@ impl Correlation {
 
     fn log_likelihood(&self, values: &[f64]) -> f64 {
         let squares: f64 = self.freed(values).iter().map(|value| value * value).sum();
-        let spread: f64 = self.rows.iter().map(|row| libm::log(row.s)).sum();
+        // The logarithm of a product, taken as seldom as it can be held.
+        let (mut spread, mut product) = (0.0, 1.0);
+        for row in &self.rows {
+            product *= row.s;
+            if !HELD.contains(&product) {
+                spread += libm::log(product);
+                product = 1.0;
+            }
+        }
+        spread += libm::log(product);
         -0.5 * values.len() as f64 * libm::log(squares) - spread
     }
 

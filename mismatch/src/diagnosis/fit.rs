@@ -11,6 +11,7 @@ use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{White, dot, symmetric};
+use crate::parallel;
 
 /// A linearization is kept as long as steps lower the cost by less than this.
 const RELINEARIZE: f64 = 0.5;
@@ -73,12 +74,13 @@ pub(crate) fn states(units: &[&Unit<'_>], terms: &[Term]) -> Option<Vec<State>> 
 
 /// The same, at the noise of the meshes of other states.
 pub(crate) fn states_at(units: &[&Unit<'_>], terms: &[Term], known: Option<&[State]>) -> Option<Vec<State>> {
-    let state = |(index, unit): (usize, &&Unit<'_>)| {
+    let numbered: Vec<_> = units.iter().enumerate().collect();
+    let state = |&(index, unit): &(usize, &&Unit<'_>)| {
         let residuals = residuals(unit, terms, &|_| true, None)?;
         let known = known.and_then(|known| known.get(index)).map(|state| &state.noise);
         Some(State { noise: noise::estimate(unit, terms, &residuals, known), residuals })
     };
-    units.iter().enumerate().map(state).collect()
+    parallel::map(&numbered, state).into_iter().collect()
 }
 
 /// The states of units to whose terms one is added.
@@ -219,10 +221,11 @@ fn improve(
     while *damping < MAX_DAMPING {
         if let Some(step) = normal.step(*damping) {
             let moved = stepped(terms, slots, &step);
-            let evaluate = |(unit, state): (&&Unit<'_>, &State)| {
+            let evaluate = |(unit, state): &(&&Unit<'_>, &State)| {
                 residuals(unit, &moved, &moving, Some(&state.residuals))
             };
-            let residuals: Option<Vec<_>> = units.iter().zip(states).map(evaluate).collect();
+            let each = parallel::map(&units.iter().zip(states).collect::<Vec<_>>(), evaluate);
+            let residuals: Option<Vec<_>> = each.into_iter().collect();
             if let Some(residuals) = residuals {
                 let after = all(&mut residuals.iter());
                 if after < before {
@@ -270,8 +273,9 @@ fn keep<T>(items: &mut Vec<T>, which: &[bool]) {
 fn linearize(units: &[&Unit<'_>], terms: &[Term], slots: &[Slot], open: &[bool], found: &mut [Vec<Column>]) {
     let places: Vec<usize> = (0..slots.len()).filter(|&position| open[position]).collect();
     let own: Vec<Slot> = places.iter().map(|&position| slots[position]).collect();
-    for (unit, known) in units.iter().zip(found) {
-        for (&position, column) in places.iter().zip(columns(unit, terms, &own)) {
+    let each = parallel::map(units, |unit| columns(unit, terms, &own));
+    for (columns, known) in each.into_iter().zip(found) {
+        for (&position, column) in places.iter().zip(columns) {
             known[position] = column;
         }
     }

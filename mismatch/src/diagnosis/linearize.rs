@@ -3,6 +3,8 @@
 //! An effect that has directions to start in is off at its start, so that it may stand in the same model as
 //! others that are: their derivatives are those that each would have alone.
 
+mod push;
+
 use pleiad_physics::{Effect, Variable};
 
 use crate::channel::Channel;
@@ -23,6 +25,8 @@ pub(crate) struct Request {
 enum Job {
     /// Derivatives of a group of stretches of a unit: requests, and positions in what they are along.
     Slopes { unit: usize, group: Vec<usize>, slots: Vec<(usize, usize)> },
+    /// The same of pushes in one stretch: of each only the windows around it.
+    Pushes { unit: usize, which: usize, requests: Vec<usize> },
     /// A whole effect in a unit.
     Whole { unit: usize, request: usize },
 }
@@ -35,9 +39,13 @@ pub(crate) fn linearized(
     states: &[State],
     requests: &[Request],
 ) -> Vec<Vec<(usize, Vec<Column>)>> {
-    let jobs = jobs(units, requests);
+    let jobs = jobs(units, terms, requests);
     let done = parallel::map(&jobs, |job| match job {
         Job::Slopes { unit, group, slots } => slopes(units[*unit], terms, requests, group, slots),
+        Job::Pushes { unit, which, requests: pushes } => {
+            let pushes: Vec<&Request> = pushes.iter().map(|&push| &requests[push]).collect();
+            push::slopes(units[*unit], terms, &pushes, *which)
+        }
         Job::Whole { unit, request } => {
             vec![whole(units[*unit], terms, &states[*unit], &requests[*request].term)]
         }
@@ -61,6 +69,14 @@ pub(crate) fn linearized(
                     }
                 }
             }
+            Job::Pushes { unit, which, requests: pushes } => {
+                let slots = pushes
+                    .iter()
+                    .flat_map(|&push| (0..requests[push].along.len()).map(move |position| (push, position)));
+                for ((push, position), part) in slots.zip(values.into_iter().flatten()) {
+                    place(push, *unit, position, *which, part);
+                }
+            }
             Job::Whole { unit, request } => {
                 for (which, part) in values.into_iter().flatten().enumerate() {
                     place(*request, *unit, 0, which, part);
@@ -71,7 +87,7 @@ pub(crate) fn linearized(
     all
 }
 
-fn jobs(units: &[&Unit<'_>], requests: &[Request]) -> Vec<Job> {
+fn jobs(units: &[&Unit<'_>], terms: &[Term], requests: &[Request]) -> Vec<Job> {
     let mut jobs = Vec::new();
     for (index, unit) in units.iter().enumerate() {
         for group in unit.groups() {
@@ -89,6 +105,17 @@ fn jobs(units: &[&Unit<'_>], requests: &[Request]) -> Vec<Job> {
             };
             let rest = slots(&rest);
             // Which window shows a push depends on its instant: no two in one model.
+            if let [which] = group[..]
+                && push::is_local(unit, terms, which)
+            {
+                let pushes: Vec<usize> = pushes.iter().map(|(request, _)| *request).collect();
+                if !pushes.is_empty() {
+                    jobs.push(Job::Pushes { unit: index, which, requests: pushes });
+                }
+                let chunks = rest.chunks(MOST_AT_ONCE).map(<[_]>::to_vec);
+                jobs.extend(chunks.map(|slots| Job::Slopes { unit: index, group: group.clone(), slots }));
+                continue;
+            }
             let pushes = pushes.iter().map(|push| slots(std::slice::from_ref(push)));
             let chunks = rest.chunks(MOST_AT_ONCE).map(<[_]>::to_vec).chain(pushes);
             jobs.extend(chunks.map(|slots| Job::Slopes { unit: index, group: group.clone(), slots }));

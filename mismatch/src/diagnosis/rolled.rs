@@ -2,6 +2,7 @@
 //! and the corrected one, on data that were not fitted.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use pleiad_estimation::RobotId;
 use pleiad_physics::{Effect, RobotModel};
@@ -13,7 +14,7 @@ use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::findings::{RobotRollOuts, RollOut};
 use crate::parallel;
-use crate::rollout::{HORIZONS_S, Planned, Rollout};
+use crate::rollout::{ALWAYS, HORIZONS_S, Planned, Rollout};
 
 /// The parameters that anyone would refit first: those of the nominal model that move a predicted pose.
 const REFITTED: [Effect; 2] = [Effect::WheelRadiusError, Effect::TrackWidthError];
@@ -98,21 +99,19 @@ impl<'r, 'a> Rolling<'r, 'a> {
     /// fold with the fit of the rest.
     fn sums(&self, fit: Option<&Fit>) -> Sums {
         let mut sums = vec![[0.0; 3]; HORIZONS_S.len()];
-        let roll = |unit: &Unit<'_>, planned: &Planned, model: &RobotModel<f64>| {
-            planned.rollouts(&self.prepared[unit.recording].evidence, unit.robot(), model)
+        let roll = |unit: &Unit<'_>, planned: &Planned, model: &RobotModel<f64>, within: &Range<f64>| {
+            planned.rollouts(&self.prepared[unit.recording].evidence, unit.robot(), model, within)
         };
         if self.tested || fit.is_none_or(|fit| fit.slots.is_empty()) {
             for (unit, planned) in &self.rolled {
                 let model = fit.map_or_else(|| unit.nominal().clone(), |fit| unit.model(&fit.terms));
-                add(&mut sums, &roll(unit, planned, &model), &|_| true);
+                add(&mut sums, &roll(unit, planned, &model, &ALWAYS));
             }
         } else if let Some(fit) = fit {
             for number in 0..FOLDS {
                 let (terms, _) = left_out(&self.fitted, fit, number);
                 for (unit, planned) in &self.rolled {
-                    let within = fold(unit, number);
-                    let kept = |rollout: &Rollout| within.contains(&rollout.time_s);
-                    add(&mut sums, &roll(unit, planned, &unit.model(&terms)), &kept);
+                    add(&mut sums, &roll(unit, planned, &unit.model(&terms), &fold(unit, number)));
                 }
             }
         }
@@ -120,9 +119,9 @@ impl<'r, 'a> Rolling<'r, 'a> {
     }
 }
 
-fn add(sums: &mut Sums, rollouts: &[Vec<Rollout>], kept: &dyn Fn(&Rollout) -> bool) {
+fn add(sums: &mut Sums, rollouts: &[Vec<Rollout>]) {
     for (sums, rollouts) in sums.iter_mut().zip(rollouts) {
-        for rollout in rollouts.iter().filter(|rollout| kept(rollout)) {
+        for rollout in rollouts {
             sums[0] += rollout.position_error_m.powi(2);
             sums[1] += rollout.heading_error_rad.powi(2);
             sums[2] += 1.0;

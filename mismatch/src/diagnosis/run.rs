@@ -82,12 +82,12 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
         let Some(tested) = role else { continue };
         prepared.push(Prepared { tested, ..Prepared::alone(recording, by_reference)? });
     }
-    let mut all: Vec<Unit<'_>> = prepared
+    let robots: Vec<_> = prepared
         .iter()
         .enumerate()
         .flat_map(|(index, own)| own.models.iter().map(move |(&robot, model)| (index, own, robot, model)))
-        .map(|(index, own, robot, model)| unit(index, own, robot, model))
         .collect();
+    let mut all = parallel::map(&robots, |&(index, own, robot, model)| unit(index, own, robot, model));
     let swaps = begun(&mut all, options);
     let fitted: Vec<&Unit<'_>> = all.iter().filter(|unit| !prepared[unit.recording].tested).collect();
     let enough = |unit: &&Unit<'_>| lasting_s(&fitted, unit.robot()) >= SHORT_S;

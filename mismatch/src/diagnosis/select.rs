@@ -74,7 +74,7 @@ pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry], terms: Vec<Term>) -
             if pool.is_fresh(&current.terms) {
                 break;
             }
-            pool = Pool::default();
+            pool.freshen(units, &current.terms);
             continue;
         }
         for fit in &added {
@@ -108,6 +108,8 @@ pub(crate) fn select(units: &[&Unit<'_>], entries: &[Entry], terms: Vec<Term>) -
 #[derive(Default)]
 pub(crate) struct Pool {
     known: BTreeMap<Entry, Vec<Candidate>>,
+    /// The terms of the robots that each was linearized beside.
+    beside: BTreeMap<Entry, Vec<Term>>,
     /// How many terms there were when the oldest of them was linearized.
     terms: Option<usize>,
 }
@@ -128,6 +130,9 @@ impl Pool {
         if self.known.is_empty() {
             self.terms = Some(current.terms.len());
         }
+        for &entry in &missing {
+            self.beside.insert(entry, beside(entry, &current.terms));
+        }
         self.known.extend(missing.into_iter().zip(found));
         let whites: Vec<White<'_, '_>> = whites(units, current);
         let scores = parallel::map(&open, |entry| {
@@ -144,6 +149,19 @@ impl Pool {
         self.known.values().flatten()
     }
 
+    /// Forgets what these terms change. A robot that is judged by itself and has the terms that it had predicts what it
+    /// predicted.
+    fn freshen(&mut self, units: &[&Unit<'_>], terms: &[Term]) {
+        if units.iter().any(|unit| unit.mesh.is_some()) {
+            *self = Self::default();
+            return;
+        }
+        let linearized = &self.beside;
+        self.known
+            .retain(|entry, _| linearized.get(entry).is_some_and(|known| *known == beside(*entry, terms)));
+        self.terms = Some(terms.len());
+    }
+
     /// Whether every candidate was linearized beside these terms.
     fn is_fresh(&self, terms: &[Term]) -> bool {
         self.terms == Some(terms.len())
@@ -156,6 +174,11 @@ impl Pool {
             !(later && overlap(added.whose, whose) && effect.info().channels.contains(&Needed::Command))
         });
     }
+}
+
+/// The terms that act on the robots of an entry.
+fn beside((_, whose): Entry, terms: &[Term]) -> Vec<Term> {
+    terms.iter().filter(|term| overlap(term.whose, whose)).cloned().collect()
 }
 
 /// Whether an effect makes the servo answer later: that moves every effect between command and wheel in time.

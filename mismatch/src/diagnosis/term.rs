@@ -15,7 +15,7 @@ pub(crate) enum Whose {
 }
 
 /// An effect with values for its parameters.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Term {
     pub(crate) effect: Effect,
     pub(crate) whose: Whose,

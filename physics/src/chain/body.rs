@@ -24,6 +24,17 @@ impl<S: Scalar> Default for BodyState<S> {
     }
 }
 
+impl BodyState<f64> {
+    /// The same state as another scalar, depending on nothing.
+    pub fn lift<S: Scalar>(&self) -> BodyState<S> {
+        let Castor { direction, since_reversal_m, against_m } = self.castor;
+        BodyState {
+            speed_m_s: self.speed_m_s.map(S::constant),
+            castor: Castor { direction, since_reversal_m: since_reversal_m.map(S::constant), against_m },
+        }
+    }
+}
+
 /// What a step adds to a pose, and the mean velocities in it.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyIncrement<S> {
@@ -255,6 +266,30 @@ mod tests {
         let step = moved(Drive::CarLike { wheelbase_m: 0.8 }, std::f64::consts::FRAC_PI_4, [10.0, 10.0]);
         assert!((step.pose.yaw_rad - 1.0 / 0.8).abs() < 1e-15);
         assert!((step.pose.x_m - 0.8 * 1.25_f64.sin()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn only_effects_that_say_so_look_at_where_the_body_is() {
+        use crate::{ActiveEffect, Effect};
+        for &effect in Effect::ALL {
+            let active = ActiveEffect::new(effect, &effect.typical_values()).expect("its own values");
+            let model = RobotModel::nominal(Drive::Differential, Nominal::ideal(0.1, 0.5)).with(active);
+            let moved = |pose: Pose<f64>| {
+                let mut context = Context::new(&model.nominal, 0.0, Motion::at_rest(pose)).over(2.0);
+                context.surroundings.partner_m = Some([0.4, 0.3]);
+                let mut state = BodyState { speed_m_s: Some(0.2), ..BodyState::default() };
+                let step = increment(&model, &context, [2.0, 3.0], &mut state);
+                let mut motion = context.motion;
+                motion.yaw_rate_rad_s = step.yaw_rate_rad_s;
+                let context = Context::new(&model.nominal, 1.0, motion);
+                let read = crate::chain::sensors::gyro(&model, &context, &mut 0.0);
+                format!("{step:?} {read:?}")
+            };
+            let nowhere = Pose::new(f64::NAN, f64::NAN, f64::NAN);
+            if !effect.places_body() {
+                assert_eq!(moved(nowhere), moved(Pose::new(0.1, 0.2, 0.3)), "{}", effect.name());
+            }
+        }
     }
 
     #[test]

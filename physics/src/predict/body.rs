@@ -68,20 +68,22 @@ impl<'a> BodyWindow<'a> {
         self.stamps_s()[0] + 0.5 * self.duration_s()
     }
 
-    /// The robot at a pose, as its wheels begin a step.
+    /// The robot at a pose, as its wheels begin a step. Its pose matters where the model `places` the body.
     fn step<S: Scalar>(
         &self,
         model: &RobotModel<S>,
         from: usize,
-        pose: Pose<S>,
+        (pose, places): (Pose<S>, bool),
         state: &mut BodyState<S>,
     ) -> BodyIncrement<S> {
         let (before, after) = (&self.track[from], &self.track[from + 1]);
         let turned = [0, 1].map(|wheel| S::constant(after.angle_rad[wheel] - before.angle_rad[wheel]));
         let mut context = self.context(model, from, pose);
-        // Effects of heading and place act as in the middle of the step.
-        let (forward_m, yaw_rad) = nominal_motion(model, &context, turned);
-        context.motion.pose = pose.compose(&Pose::exp(forward_m * 0.5, S::zero(), yaw_rad * 0.5));
+        if places {
+            // Effects of heading and place act as in the middle of the step.
+            let (forward_m, yaw_rad) = nominal_motion(model, &context, turned);
+            context.motion.pose = pose.compose(&Pose::exp(forward_m * 0.5, S::zero(), yaw_rad * 0.5));
+        }
         increment(model, &context, turned, state)
     }
 
@@ -142,11 +144,14 @@ struct Rollout<S> {
     before: BodyState<S>,
 }
 
+/// Rolls a window out; if nobody asks for `positions`, the yaw alone unless the model needs them itself.
 fn roll_out<S: Scalar>(
     model: &RobotModel<S>,
     window: &BodyWindow<'_>,
     state: &mut BodyState<S>,
+    positions: bool,
 ) -> Rollout<S> {
+    let places = model.places_body();
     let start: Pose<S> = Pose::constant(window.start.x_m, window.start.y_m, window.start.yaw_rad);
     let before = *state;
     let mut motion = Motion::at_rest(start);
@@ -155,8 +160,13 @@ fn roll_out<S: Scalar>(
         if window.track[from + 1].time_s <= window.track[from].time_s {
             continue;
         }
-        let step = window.step(model, from, motion.pose, state);
-        motion.pose = step.applied_to(&motion.pose);
+        let step = window.step(model, from, (motion.pose, places), state);
+        if positions || places {
+            motion.pose = step.applied_to(&motion.pose);
+        } else {
+            motion.pose.yaw_rad += step.driven[2];
+            motion.pose.yaw_rad += step.added.yaw_rad;
+        }
         motion.speed_m_s = step.speed_m_s;
         motion.yaw_rate_rad_s = step.yaw_rate_rad_s;
         motion.acceleration_m_s2 = step.acceleration_m_s2;
@@ -171,8 +181,13 @@ pub fn body_motion<S: Scalar>(
     window: &BodyWindow<'_>,
     state: &mut BodyState<S>,
 ) -> Pose<S> {
-    let rollout = roll_out(model, window, state);
+    let rollout = roll_out(model, window, state, true);
     rollout.start.between(&rollout.end)
+}
+
+/// What the body remembers after the window.
+pub fn body_state<S: Scalar>(model: &RobotModel<S>, window: &BodyWindow<'_>, state: &mut BodyState<S>) {
+    roll_out(model, window, state, false);
 }
 
 /// The motion that the reference system sees between two reference poses with these stamps, near the ends
@@ -187,7 +202,7 @@ pub fn truth_change<S: Scalar>(
     stamps_s: [f64; 2],
     state: &mut BodyState<S>,
 ) -> Pose<S> {
-    let rollout = roll_out(model, window, state);
+    let rollout = roll_out(model, window, state, true);
     let first = seen_after(model, window, (0, rollout.start, &rollout.before), stamps_s[0]);
     let last = seen_after(model, window, (1, rollout.end, state), stamps_s[1]);
     first.between(&last)
@@ -216,6 +231,7 @@ fn carried<S: Scalar>(
     (mut at, mut pose, state): (usize, Pose<S>, &BodyState<S>),
     ahead_s: S,
 ) -> Pose<S> {
+    let places = model.places_body();
     let mut state = *state;
     let mut rest_s = ahead_s;
     let forth = ahead_s.value() >= 0.0;
@@ -231,7 +247,7 @@ fn carried<S: Scalar>(
             };
             return match from.and_then(lasted_s) {
                 Some((from, lasted_s)) if lasted_s > 0.0 => {
-                    let step = window.step(model, from, pose, &mut state);
+                    let step = window.step(model, from, (pose, places), &mut state);
                     let share = rest_s / lasted_s;
                     let driven = step.driven.map(|part| part * share);
                     driven_from(&pose, driven, &step.added.share(share))
@@ -243,7 +259,7 @@ fn carried<S: Scalar>(
         let step_s = (there.time_s - here.time_s).abs();
         if step_s > 0.0 {
             let from = at.min(next);
-            let step = window.step(model, from, pose, &mut state);
+            let step = window.step(model, from, (pose, places), &mut state);
             let part_s = rest_s * sense;
             if part_s.value() < step_s {
                 let share = part_s / step_s;
@@ -335,7 +351,7 @@ fn drive<S: Scalar>(
 
 /// The mean yaw rate that the gyro reads over the window, rad/s.
 pub fn mean_gyro<S: Scalar>(model: &RobotModel<S>, window: &BodyWindow<'_>, state: &mut BodyState<S>) -> S {
-    let rollout = roll_out(model, window, state);
+    let rollout = roll_out(model, window, state, false);
     let mut motion = rollout.motion;
     let duration_s = window.duration_s();
     if duration_s > 0.0 {

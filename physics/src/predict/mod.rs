@@ -8,5 +8,7 @@ mod body;
 mod sensors;
 
 pub use actuator::{CommandWindow, wheel_turns};
-pub use body::{BodyWindow, EncoderSample, body_motion, commanded_truth_change, mean_gyro, truth_change};
+pub use body::{
+    BodyWindow, EncoderSample, body_motion, body_state, commanded_truth_change, mean_gyro, truth_change,
+};
 pub use sensors::{Anchor, Instant, Path, gps, heading, sighting, truth};

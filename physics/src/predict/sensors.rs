@@ -62,9 +62,8 @@ impl<'m, 'a, S: Scalar> Carrier<'m, 'a, S> {
             let since_s = clock_error_s - truth.latency_s;
             let known = (anchor.time_s, &anchor.on_path[0]);
             let path_from_robot = along(anchor.path, Some(known), since_s + anchor.time_s)?;
-            let pose: Pose<S> = Pose::constant(anchor.pose.x_m, anchor.pose.y_m, anchor.pose.yaw_rad);
-            let map_from_robot = pose.compose(&sensors::marker(&truth).between(&Pose::identity()));
-            Some((map_from_robot.compose(&path_from_robot.between(&Pose::identity())), anchor))
+            let map_from_robot = anchor.pose.lift().compose_plainly(&sensors::marker(&truth).inverse());
+            Some((map_from_robot.compose_plainly(&path_from_robot.inverse()), anchor))
         });
         Self { instant, truth, clock_error_s, map_from_path: anchored }
     }
@@ -74,7 +73,7 @@ impl<'m, 'a, S: Scalar> Carrier<'m, 'a, S> {
         let time_s = self.instant.time_s;
         let on_path = |(map_from_path, anchor): &(Pose<S>, Anchor<'_>)| {
             let known = (time_s, &anchor.on_path[1]);
-            Some(map_from_path.compose(&along(anchor.path, Some(known), -age_s + time_s)?))
+            Some(map_from_path.compose_plainly(&along(anchor.path, Some(known), -age_s + time_s)?))
         };
         self.map_from_path.as_ref().and_then(on_path).unwrap_or_else(|| {
             let shift_s = self.clock_error_s - self.truth.latency_s;
@@ -99,7 +98,8 @@ fn along<S: Scalar>(path: &dyn Path, known: Option<(f64, &Motion<f64>)>, time_s:
         Some((known_s, motion)) if known_s == then_s => *motion,
         _ => path.motion_at(then_s)?,
     };
-    Some(motion.lift().carried(time_s - then_s))
+    // The stamp itself is met: what is left to carry is its derivative.
+    Some(if time_s.is_constant() { motion.pose.lift() } else { motion.lift().carried(time_s - then_s) })
 }
 
 impl Instant<'_> {

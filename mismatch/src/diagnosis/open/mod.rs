@@ -87,13 +87,10 @@ pub(crate) fn open(
 ) -> Opened {
     let robots: BTreeSet<RobotId> = units.iter().map(|unit| unit.robot()).collect();
     let robots: Vec<RobotId> = robots.into_iter().collect();
-    let grounds: Vec<Ground<'_, '_>> = robots
-        .iter()
-        .map(|&robot| {
-            let own: Vec<&Unit<'_>> = units.iter().copied().filter(|unit| unit.robot() == robot).collect();
-            Ground::new(own, &fit.terms, &wandering(spread, robot))
-        })
-        .collect();
+    let grounds = parallel::map(&robots, |&robot| {
+        let own: Vec<&Unit<'_>> = units.iter().copied().filter(|unit| unit.robot() == robot).collect();
+        Ground::new(own, &fit.terms, &wandering(spread, robot))
+    });
     let tests = tests + grounds.iter().map(Ground::tests).sum::<usize>();
     let each = parallel::map(&robots.iter().zip(&grounds).collect::<Vec<_>>(), |(robot, ground)| {
         let base = Picture::new(units, fit, **robot);

@@ -309,9 +309,15 @@ impl<'u, 'a> Ground<'u, 'a> {
         (regressor, basis): (Base, &Basis),
         motions: &[Motions],
     ) -> Option<(Knots, Together)> {
-        let column =
-            |knot: usize| self.columns_in(motions, target, &|at| basis.value(knot, at.get(regressor)));
-        let all: Knots = (0..basis.knots.len()).map(|knot| (knot, column(knot))).collect();
+        let mut all: Knots = (0..basis.knots.len()).map(|knot| (knot, Vec::new())).collect();
+        for (unit, motions) in self.units.iter().zip(motions) {
+            let at = |which: usize| motions.samples(unit, which).iter().map(|at| at.get(regressor));
+            let values: BTreeMap<usize, Vec<Vec<f64>>> =
+                target.shown(unit).into_iter().map(|which| (which, basis.values(at(which)))).collect();
+            for (knot, columns) in &mut all {
+                columns.push(target.gathered(unit, motions, &|which| values[&which][*knot].clone()));
+            }
+        }
         // Beside a constant that is fitted the height of the curve says nothing: it is zero in the middle.
         let middle = basis.knots.len() / 2;
         let bent: Knots = all.iter().filter(|(knot, _)| *knot != middle).cloned().collect();

@@ -47,8 +47,13 @@ impl Basis {
 
     /// The function of a knot; beyond the knots, its value at the last. Zero where the regressor is not known.
     pub(crate) fn value(&self, own: usize, x: f64) -> f64 {
+        self.locate(x).map_or(0.0, |place| self.at_place(own, &place))
+    }
+
+    /// Where a value lies among the knots; `None` where the regressor is not known.
+    fn locate(&self, x: f64) -> Option<Located> {
         if !x.is_finite() {
-            return 0.0;
+            return None;
         }
         let last = self.knots.len() - 1;
         let x = x.clamp(self.knots[0], self.knots[last]);
@@ -56,12 +61,35 @@ impl Basis {
         let (from, to) = (self.knots[after - 1], self.knots[after]);
         let step = to - from;
         let (a, b) = ((to - x) / step, (x - from) / step);
-        let at = |knot: usize| if knot == own { 1.0 } else { 0.0 };
-        let bend = &self.bends[own];
-        a * at(after - 1)
-            + b * at(after)
-            + ((a * a * a - a) * bend[after - 1] + (b * b * b - b) * bend[after]) * step * step / 6.0
+        let bends = [a * a * a - a, b * b * b - b].map(|bend| bend * step * step / 6.0);
+        Some(Located { after, shares: [a, b], bends })
     }
+
+    fn at_place(&self, own: usize, place: &Located) -> f64 {
+        let at = |knot: usize| if knot == own { 1.0 } else { 0.0 };
+        let [before, after] = [place.after - 1, place.after];
+        let bend = &self.bends[own];
+        place.shares[0] * at(before)
+            + place.shares[1] * at(after)
+            + place.bends[0] * bend[before]
+            + place.bends[1] * bend[after]
+    }
+
+    /// By knot, its function at many values, each of which is looked up once.
+    pub(crate) fn values(&self, at: impl Iterator<Item = f64>) -> Vec<Vec<f64>> {
+        let places: Vec<Option<Located>> = at.map(|x| self.locate(x)).collect();
+        let value = |own: usize, place: &Option<Located>| {
+            place.as_ref().map_or(0.0, |place| self.at_place(own, place))
+        };
+        (0..self.knots.len()).map(|own| places.iter().map(|place| value(own, place)).collect()).collect()
+    }
+}
+
+/// A value between two knots: the second of them, the shares of both, and what their bends count.
+struct Located {
+    after: usize,
+    shares: [f64; 2],
+    bends: [f64; 2],
 }
 
 /// Second derivatives of the spline that is one at a knot: a tridiagonal system.

@@ -243,24 +243,39 @@ impl Target {
     fn roll(self, motions: &Motions, rates: &[f64], part: &mut [f64]) {
         let body = &motions.body;
         for (values, &Span { first, count, step_s }) in part.chunks_exact_mut(3).zip(&body.rows) {
-            // By how much the heading is off so far.
-            let mut off_rad = 0.0;
             let samples = first..first + count;
-            let driven = body.turned[samples.clone()].iter().zip(&body.driven_m[samples.clone()]);
-            for (rate, (&[cos, sin], driven_m)) in rates[samples].iter().zip(driven) {
-                let added = rate * step_s;
-                let along = match self {
-                    Self::Forward => [added, 0.0],
-                    Self::Left => [0.0, added],
-                    _ => {
-                        off_rad += added;
-                        [0.0, driven_m * (off_rad - 0.5 * added)]
+            let turned = body.turned[samples.clone()].iter();
+            let rates = rates[samples.clone()].iter().zip(turned);
+            let (mut ahead, mut left) = (0.0, 0.0);
+            match self {
+                Self::Forward => {
+                    for (rate, [cos, sin]) in rates {
+                        let added = rate * step_s;
+                        ahead += added * cos;
+                        left += added * sin;
                     }
-                };
-                values[0] += along[0] * cos - along[1] * sin;
-                values[1] += along[0] * sin + along[1] * cos;
+                }
+                Self::Left => {
+                    for (rate, [cos, sin]) in rates {
+                        let added = rate * step_s;
+                        ahead -= added * sin;
+                        left += added * cos;
+                    }
+                }
+                _ => {
+                    // By how much the heading is off so far.
+                    let mut off_rad = 0.0;
+                    for ((rate, [cos, sin]), driven_m) in rates.zip(&body.driven_m[samples]) {
+                        let added = rate * step_s;
+                        off_rad += added;
+                        let along = driven_m * (off_rad - 0.5 * added);
+                        ahead -= along * sin;
+                        left += along * cos;
+                    }
+                    values[2] = off_rad;
+                }
             }
-            values[2] += off_rad;
+            (values[0], values[1]) = (ahead, left);
         }
     }
 

@@ -59,9 +59,19 @@ impl Student {
         (1.0 + self.reciprocal) * square / (1.0 + self.reciprocal * square) - 1.0
     }
 
+    /// By how much the log-density of an error of `z` scales falls with `z`.
+    pub(super) fn pull(self, z: f64) -> f64 {
+        (1.0 + self.reciprocal) * z / (1.0 + self.reciprocal * z * z)
+    }
+
     /// Of two errors of so many scales each, by the product of the scales: with half the logarithms.
-    pub(super) fn log_density_of_two(self, [a, b]: [f64; 2], scales: f64) -> f64 {
-        let constant = 2.0 * (self.constant - HALF_LOG_TAU) - libm::log(scales);
+    pub(super) fn log_density_of_two(self, errors: [f64; 2], scales: f64) -> f64 {
+        self.log_density_by(errors, libm::log(scales))
+    }
+
+    /// The same, by the logarithm of the product of the scales.
+    pub(super) fn log_density_by(self, [a, b]: [f64; 2], log_scales: f64) -> f64 {
+        let constant = 2.0 * (self.constant - HALF_LOG_TAU) - log_scales;
         if self.reciprocal < GAUSSIAN {
             return constant - 0.5 * (a * a + b * b);
         }
@@ -74,6 +84,15 @@ impl Student {
 pub(super) fn log_sum(a: f64, b: f64) -> f64 {
     let (high, low) = if a > b { (a, b) } else { (b, a) };
     if high == f64::NEG_INFINITY { high } else { high + libm::log1p(libm::exp(low - high)) }
+}
+
+/// The same of many.
+pub(super) fn log_sum_of(all: impl Iterator<Item = f64> + Clone) -> f64 {
+    let high = all.clone().fold(f64::NEG_INFINITY, f64::max);
+    if all.clone().nth(1).is_none() || high == f64::NEG_INFINITY {
+        return high;
+    }
+    high + libm::log(all.map(|own| libm::exp(own - high)).sum())
 }
 
 #[cfg(test)]

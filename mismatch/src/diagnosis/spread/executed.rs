@@ -21,26 +21,14 @@ use pleiad_physics::{Context, Effect, Motion, Pose, RobotModel};
 use crate::channel::Channel;
 use crate::diagnosis::fit::Fit;
 use crate::diagnosis::naming::NEAR_END;
-use crate::diagnosis::noise;
 use crate::diagnosis::spread::Explained;
-use crate::diagnosis::spread::check::{Check, LEAST_OF_TARGET};
-use crate::diagnosis::spread::density::{Student, log_sum};
 use crate::diagnosis::spread::family::{Family, Member, Place, Shown, Shows, blocks};
-use crate::diagnosis::spread::maximum::{Bounds, Density};
+use crate::diagnosis::spread::maximum::Bounds;
+use crate::diagnosis::spread::timing::{DELAY, JITTER, LOSS, NEVER, NOISE, Row, TAILS, Windows};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::Unit;
 use crate::track::{Track, motion};
 
-/// Logarithms of the white noise of both components.
-const NOISE: usize = 0;
-/// A delay of all commands, seconds.
-const DELAY: usize = 2;
-/// The square of the jitter's greatest delay.
-const JITTER: usize = 3;
-/// The logarithm of the probability of a loss.
-const LOSS: usize = 4;
-/// The reciprocal of the degrees of freedom of the noise: windows that nothing here explains.
-const TAILS: usize = 5;
 /// Of this many commands of a window it is asked whether they were lost.
 const ASKED: usize = 8;
 /// After this many time constants a command's delay no longer shows.
@@ -51,104 +39,6 @@ const GAP_S: f64 = 0.5;
 const BENT: f64 = 0.3;
 /// A lost command must change a window by this share of its noise.
 const LEAST_CHANGE: f64 = 0.3;
-/// A delay of this length, seconds, shows in a window beyond its noise if it is to be looked at.
-const MATTERS_S: f64 = 0.05;
-/// The logarithm of a probability that is as good as zero.
-const NEVER: f64 = -14.0;
-
-/// One window of the wheels: their mean, and right minus left.
-struct Row {
-    residual: [f64; 2],
-    /// Change with a delay of every command, rad/s.
-    delayed: [f64; 2],
-    /// The sum of the squares of the same, command by command.
-    agitation: [f64; 2],
-    /// What each of the commands asked for changes if it is lost.
-    lost: Vec<[f64; 2]>,
-    declared_jitter_s: f64,
-    time_s: f64,
-}
-
-struct Windows {
-    rows: Vec<Row>,
-    blocks: Vec<usize>,
-}
-
-impl Density for Windows {
-    fn rows(&self) -> usize {
-        self.rows.len()
-    }
-
-    fn blocks(&self) -> &[usize] {
-        &self.blocks
-    }
-
-    fn fill(&self, parameters: &[f64], into: &mut [f64]) {
-        let white = [0, 1].map(|component| libm::exp(2.0 * parameters[NOISE + component]));
-        let student = Student::new(parameters[TAILS]);
-        let lost = parameters[LOSS];
-        let kept = libm::log1p(-libm::exp(lost));
-        for (row, value) in self.rows.iter().zip(into) {
-            let jitter = (parameters[JITTER] + row.declared_jitter_s.powi(2)) / 12.0;
-            let sigma = [0, 1].map(|part: usize| (white[part] + jitter * row.agitation[part]).sqrt());
-            let of = |changes: [f64; 2]| -> f64 {
-                let part = |part: usize| {
-                    let expected = parameters[DELAY] * row.delayed[part] + changes[part];
-                    student.log_density((row.residual[part] - expected) / sigma[part], sigma[part])
-                };
-                part(0) + part(1)
-            };
-            *value = of([0.0; 2]);
-            if lost == f64::NEG_INFINITY || row.lost.is_empty() {
-                continue;
-            }
-            let count = row.lost.len() as f64;
-            let mut sum = *value + count * kept;
-            for (index, one) in row.lost.iter().enumerate() {
-                sum = log_sum(sum, of(*one) + lost + (count - 1.0) * kept);
-                for other in &row.lost[..index] {
-                    let both = [one[0] + other[0], one[1] + other[1]];
-                    sum = log_sum(sum, of(both) + 2.0 * lost + (count - 2.0) * kept);
-                }
-            }
-            *value = sum;
-        }
-    }
-
-    /// A jitter and a loss are drawn anew for every command: neither they nor what they leave of a delay know the time,
-    /// or how much was asked for. What no loss explains is looked at: of windows with one nothing is said.
-    fn checks(&self, parameters: &[f64]) -> Vec<Check> {
-        let each = |part: usize| {
-            let mut late = Vec::new();
-            let mut blocks = Vec::new();
-            let (mut times, mut sizes) = (Vec::new(), Vec::new());
-            for (row, &block) in self.rows.iter().zip(&self.blocks) {
-                let jitter = (parameters[JITTER] + row.declared_jitter_s.powi(2)) / 12.0;
-                let sigma = (libm::exp(2.0 * parameters[NOISE + part]) + jitter * row.agitation[part]).sqrt();
-                let z = (row.residual[part] - parameters[DELAY] * row.delayed[part]) / sigma;
-                // Where no command changes anything a delay does not show.
-                if row.agitation[part].sqrt() * MATTERS_S < sigma {
-                    continue;
-                }
-                let z = z * row.delayed[part].signum();
-                late.push(0.5 * z.clamp(-noise::CLIP, noise::CLIP));
-                blocks.push(block);
-                times.push(row.time_s);
-                sizes.push(row.agitation[part]);
-            }
-            Check {
-                of: "delays",
-                left: late,
-                blocks,
-                drivers: vec![("time", times), ("size", sizes)],
-                targets: Vec::new(),
-                least_of_target: LEAST_OF_TARGET,
-            }
-        };
-        if parameters[LOSS] > NEVER { Vec::new() } else { vec![each(0), each(1)] }
-    }
-}
-
 /// The wheels of one robot against its commands, under a fit of the mean.
 pub(super) fn family<'u, 'a>(units: &[&'u Unit<'a>], fit: &Fit) -> Option<Family<'u, 'a>> {
     let mut rows = Vec::new();

@@ -21,6 +21,7 @@ mod scans;
 mod sighted;
 mod swap;
 mod ticks;
+mod timing;
 mod walk;
 mod yaw;
 

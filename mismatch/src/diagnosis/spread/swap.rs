@@ -23,6 +23,7 @@ use crate::diagnosis::spread::scans::{scans, targets};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{BLOCK_S, Unit};
 use crate::findings::Place;
+use crate::parallel;
 
 /// The nominal model may be off by so many times the noise for reasons of its own.
 const SLACK: f64 = 3.0;
@@ -59,9 +60,11 @@ pub(crate) fn swaps(units: &mut [Unit<'_>]) -> Swaps {
     robots.sort_unstable();
     robots.dedup();
     let mut of_robots: BTreeMap<RobotId, Gains> = BTreeMap::new();
-    for robot in robots {
-        let own: Vec<&Unit<'_>> = units.iter().filter(|unit| unit.robot() == robot).collect();
-        let gains = gains(&own);
+    let known: &[Unit<'_>] = units;
+    let each = parallel::map(&robots, |&robot| {
+        gains(&known.iter().filter(|unit| unit.robot() == robot).collect::<Vec<_>>())
+    });
+    for (robot, gains) in robots.into_iter().zip(each) {
         if gains.is_empty() {
             continue;
         }

@@ -75,8 +75,17 @@ impl Filter {
     /// Slip and bias go on for a time.
     fn pass(&mut self, step_s: f64, parameters: &[f64], constant_s: f64) {
         let (variance, ratio) = (parameters[SLIP], step_s / constant_s);
-        let kept = libm::exp(-ratio);
+        self.covariance[BIAS][BIAS] += parameters[WALK] * step_s;
+        if variance == 0.0 {
+            // No slip lasts: its rate is zero, and known to be.
+            for angle in [SINCE_GYRO, SINCE_TRUTH] {
+                self.covariance[angle][SINCE_GYRO] += parameters[SPREAD] * step_s;
+                self.covariance[angle][SINCE_TRUTH] += parameters[SPREAD] * step_s;
+            }
+            return;
+        }
         let lost = -libm::expm1(-ratio);
+        let kept = 1.0 - lost;
         let turned_s = constant_s * lost;
         // The rate goes on as a part of itself; both angles gain the same.
         for angle in [SINCE_GYRO, SINCE_TRUTH] {
@@ -110,7 +119,6 @@ impl Filter {
             self.covariance[RATE][angle] += between;
         }
         self.covariance[RATE][RATE] += variance * (1.0 - kept * kept);
-        self.covariance[BIAS][BIAS] += parameters[WALK] * step_s;
     }
 
     /// A window begins at an error `share` times that of the last end.
@@ -198,7 +206,10 @@ impl Density for Readings {
                 }
                 Event::Gyro(age_s, residual) => {
                     filter.end(parameters[EDGE]);
-                    let warm = parameters[WARM] * -libm::expm1(-age_s / warming_s);
+                    let warm = match parameters[WARM] {
+                        0.0 => 0.0,
+                        warm => warm * -libm::expm1(-age_s / warming_s),
+                    };
                     put(filter.read(residual - warm, [0.0, 1.0 / self.window_s, 0.0, 1.0, 1.0], white));
                     filter.begin(SINCE_GYRO, -self.window_s);
                 }
