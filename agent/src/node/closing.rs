@@ -113,7 +113,9 @@ impl Node {
         if let Some(from) = self.ledger.views().and_then(|views| views.held_back(self.config.robot)) {
             until = until.min(from);
         }
-        if until < trajectory.start() {
+        // After a rebase the earlier part is of this life too.
+        let earlier = self.rebased.and_then(|old| self.segments.of(old));
+        if until < earlier.unwrap_or(trajectory).start() {
             until = Timestamp::MIN;
         }
         // A new life says at once how much there is of the earlier ones: before, nobody relies on those.
