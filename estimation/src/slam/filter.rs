@@ -1,7 +1,10 @@
 //! The filter: scans of sightings into a map.
 
 mod delayed;
+mod joint;
 mod nearest;
+
+pub use joint::{JointRules, JointSlam};
 
 use super::bearings::{BearingTrack, DelayedRules};
 use super::initialize::{Sight, from_one};
@@ -22,6 +25,9 @@ pub enum Association {
     Identity,
     /// By what they measure alone: nearest neighbour.
     Nearest,
+    /// By what they measure alone, decided jointly over time by [`JointSlam`]; one [`Slam`] for itself takes it for
+    /// [`Association::Nearest`].
+    Joint,
 }
 
 /// How a map is made.
@@ -206,7 +212,7 @@ impl Slam {
                     outcomes[sighting.index] = self.named(time, name, sighting);
                 }
             }
-            Association::Nearest => self.nearest(time, open, &mut outcomes),
+            Association::Nearest | Association::Joint => self.nearest(time, open, &mut outcomes),
         }
         self.forget(time);
         Ok(outcomes)
