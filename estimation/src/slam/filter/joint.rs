@@ -202,18 +202,25 @@ impl JointSlam {
             };
             child(-2.0 * libm::log(self.rules.ghost_density), Answer::Ghost);
             let Some(area_m2) = places(seen) else { continue };
-            child(-2.0 * libm::log(self.rules.new_per_m2 * area_m2), Answer::New);
+            let mut fits = Vec::new();
             for (known, entry) in slam.map.iter().enumerate() {
                 let innovation =
                     slam.state.innovation(SlamState::VEHICLE, entry.block, &seen.relative, &seen.noise);
-                if let Ok(innovation) = innovation
-                    && innovation.nis <= slam.settings.gate[innovation.dimension - 1]
-                    && !taken.contains(&entry.id)
-                {
+                let Ok(innovation) = innovation else { continue };
+                if innovation.nis <= slam.settings.gate[innovation.dimension - 1] {
                     let constant = innovation.dimension as f64 * LN_TWO_PI;
-                    child(innovation.nis + innovation.log_determinant + constant, Answer::Known(known));
+                    fits.push((known, innovation.nis + innovation.log_determinant + constant));
                 }
             }
+            // None is more likely to be seen than another. Without this share two landmarks in one place would explain
+            // their sightings better than one does, by taking the nearer one each time.
+            let share = 2.0 * libm::log(fits.len().max(1) as f64);
+            for (known, cost) in &fits {
+                if !taken.contains(&slam.map[*known].id) {
+                    child(cost + share, Answer::Known(*known));
+                }
+            }
+            child(-2.0 * libm::log(self.rules.new_per_m2 * area_m2), Answer::New);
         }
         children
     }
