@@ -112,7 +112,7 @@ impl Axis {
             axis.insert("dtick".into(), 1.into());
         }
         if self.scale == Scale::Logarithmic {
-            axis.insert("dtick".into(), 1.into());
+            // No dtick: below two decades, ticks at whole powers of ten alone would leave a single number.
             axis.insert("exponentformat".into(), "power".into());
         }
         if let Some((low, high)) = self.range {

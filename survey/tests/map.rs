@@ -31,8 +31,9 @@ fn errors_per_metre_are_recovered_from_wrong_parameters_and_a_change_is_followed
         Drift { trans: sum(|drift| drift.trans), rot_rad_m: sum(|drift| drift.rot_rad_m) }
     };
     let (first, second) = (mean(120.0, 200.0), mean(320.0, 400.0));
-    assert!((first.trans - 0.03).abs() < 0.01 && (first.rot_rad_m + 0.02).abs() < 0.01, "{first:?}");
-    assert!((second.trans + 0.02).abs() < 0.01 && (second.rot_rad_m - 0.015).abs() < 0.01, "{second:?}");
+    // Over seeds 1 to 20 of the study means are off by 0.0002 at most and single runs scatter by 0.0014: nearly three times that.
+    assert!((first.trans - 0.03).abs() < 0.004 && (first.rot_rad_m + 0.02).abs() < 0.004, "{first:?}");
+    assert!((second.trans + 0.02).abs() < 0.004 && (second.rot_rad_m - 0.015).abs() < 0.004, "{second:?}");
     // The planted fault: a belief that never adapts stays wrong.
     let still = with(1.0);
     assert!(

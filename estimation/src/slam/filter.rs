@@ -1,7 +1,12 @@
 //! The filter: scans of sightings into a map.
 
-use super::associate::{Candidate, associate};
-use super::bearings::{BearingTrack, DelayedRules, KeptBearing};
+mod delayed;
+mod joint;
+mod nearest;
+
+pub use joint::{JointRules, JointSlam};
+
+use super::bearings::{BearingTrack, DelayedRules};
 use super::initialize::{Sight, from_one};
 use super::state::{Block, SlamState};
 use crate::fact::Noise;
@@ -20,6 +25,9 @@ pub enum Association {
     Identity,
     /// By what they measure alone: nearest neighbour.
     Nearest,
+    /// By what they measure alone, decided jointly over time by [`JointSlam`]; one [`Slam`] for itself takes it for
+    /// [`Association::Nearest`].
+    Joint,
 }
 
 /// How a map is made.
@@ -204,7 +212,7 @@ impl Slam {
                     outcomes[sighting.index] = self.named(time, name, sighting);
                 }
             }
-            Association::Nearest => self.nearest(time, open, &mut outcomes),
+            Association::Nearest | Association::Joint => self.nearest(time, open, &mut outcomes),
         }
         self.forget(time);
         Ok(outcomes)
@@ -215,59 +223,6 @@ impl Slam {
             Some(known) => self.use_for(known, sighting),
             None => self.found(time, Some(name), sighting),
         }
-    }
-
-    fn nearest(&mut self, time: Timestamp, mut open: Vec<Open>, outcomes: &mut [Outcome]) {
-        // Landmarks that were there before this scan; what it founds is not seen twice in it.
-        let mut free: Vec<usize> = (0..self.map.len()).collect();
-        loop {
-            let candidates = self.candidates(&open, &free);
-            let Some(choice) = associate(&candidates, self.settings.margin) else { break };
-            let sighting = open.remove(choice.sighting);
-            let landmark = free.remove(choice.landmark);
-            let outcome = self.use_for(landmark, &sighting);
-            outcomes[sighting.index] = outcome;
-            if let Outcome::Rejected { .. } = outcome {
-                // On the gate but for rounding; the landmark may be gone, and the indices with it.
-                break;
-            }
-        }
-        let known = self.map.len();
-        for sighting in open {
-            outcomes[sighting.index] = if self.apart(&sighting, known) {
-                self.found(time, None, &sighting)
-            } else {
-                Outcome::Ambiguous
-            };
-        }
-    }
-
-    fn candidates(&self, open: &[Open], free: &[usize]) -> Vec<Candidate> {
-        let mut candidates = Vec::new();
-        for (sighting, seen) in open.iter().enumerate() {
-            for (landmark, entry) in free.iter().enumerate() {
-                let block = self.map[*entry].block;
-                let innovation =
-                    self.state.innovation(SlamState::VEHICLE, block, &seen.relative, &seen.noise);
-                if let Ok(innovation) = innovation
-                    && innovation.nis <= self.settings.gate[innovation.dimension - 1]
-                {
-                    let (nis, log_determinant) = (innovation.nis, innovation.log_determinant);
-                    candidates.push(Candidate { sighting, landmark, nis, log_determinant });
-                }
-            }
-        }
-        candidates
-    }
-
-    /// Whether a sighting is of none of the first `known` landmarks.
-    fn apart(&self, seen: &Open, known: usize) -> bool {
-        self.map.iter().take(known).all(|entry| {
-            let innovation =
-                self.state.innovation(SlamState::VEHICLE, entry.block, &seen.relative, &seen.noise);
-            innovation
-                .map_or(true, |innovation| innovation.nis > self.settings.apart[innovation.dimension - 1])
-        })
     }
 
     fn use_for(&mut self, known: usize, sighting: &Open) -> Outcome {
@@ -316,102 +271,6 @@ impl Slam {
         let entry = MapEntry { id, block, name, sightings: 1, since, confirmed: false };
         self.map.push(entry);
         id
-    }
-
-    /// A bearing of a landmark that is not in the map: crossed with one kept, kept, or let go.
-    fn wait(
-        &mut self,
-        time: Timestamp,
-        name: Option<LandmarkId>,
-        bearing_rad: f64,
-        noise: &Noise,
-    ) -> Outcome {
-        let rules = self.settings.delayed;
-        let vehicle = self.state.vehicle();
-        let slack_rad = 3.0 * libm::sqrt(noise.lower[0]);
-        let fits = |track: &&BearingTrack| match name {
-            Some(_) => track.name == name,
-            None => track.last_seen < time && track.misfit_rad(&vehicle, bearing_rad, &rules) <= slack_rad,
-        };
-        let mut fitting = self.tracks.iter().enumerate().filter(|(_, track)| fits(track));
-        let (found, other) = (fitting.next().map(|(index, _)| index), fitting.next());
-        if other.is_some() {
-            return Outcome::Ambiguous;
-        }
-        if let Some(index) = found {
-            self.tracks[index].last = (vehicle, bearing_rad);
-            self.tracks[index].last_seen = time;
-            if let Some((best, landmark)) = self.tracks[index].cross(&self.state, bearing_rad, noise, &rules)
-            {
-                return self.crossed(time, index, best, &landmark, noise);
-            }
-        }
-        if let Some(pose) = self.pose_here() {
-            let kept = KeptBearing { pose, bearing_rad };
-            match found {
-                Some(index) if self.tracks[index].kept.iter().any(|kept| kept.pose == pose) => {}
-                Some(index) => self.tracks[index].kept.push(kept),
-                None => self.tracks.push(BearingTrack {
-                    name,
-                    kept: vec![kept],
-                    last_seen: time,
-                    last: (vehicle, bearing_rad),
-                }),
-            }
-        }
-        Outcome::Waiting
-    }
-
-    /// The pose kept of this scan; a new one if the vehicle has come far enough since the last.
-    fn pose_here(&mut self) -> Option<Block> {
-        if self.here.is_some() {
-            return self.here;
-        }
-        if let Some(last) = self.poses.last() {
-            let gone = self.state.vehicle().position() - self.state.place(*last).position();
-            if gone.norm() < self.settings.delayed.baseline_m {
-                return None;
-            }
-        }
-        if self.poses.len() >= self.settings.delayed.most_poses {
-            let oldest = self.poses.remove(0);
-            self.state.remove(oldest);
-            for track in &mut self.tracks {
-                track.kept.retain(|kept| kept.pose != oldest);
-            }
-        }
-        let pose = self.state.keep_pose();
-        self.poses.push(pose);
-        self.here = Some(pose);
-        self.here
-    }
-
-    /// A landmark enters the state; its other kept bearings update it.
-    fn crossed(
-        &mut self,
-        time: Timestamp,
-        track: usize,
-        best: usize,
-        landmark: &super::Initialized,
-        noise: &Noise,
-    ) -> Outcome {
-        let track = self.tracks.remove(track);
-        let block = self.state.insert(landmark, [track.kept[best].pose, SlamState::VEHICLE]);
-        let id = self.enter(block, track.name, time);
-        let mut used = 2;
-        for (index, kept) in track.kept.iter().enumerate() {
-            let relative = Relative::Bearing { bearing_rad: kept.bearing_rad };
-            if index != best {
-                // One that does not fit is left out, as a later one would be.
-                let update = self.state.update(kept.pose, block, &relative, noise, &self.settings.gate);
-                used += u32::from(matches!(update, Ok(Update::Used { .. })));
-            }
-        }
-        if let Some(entry) = self.map.last_mut() {
-            entry.sightings = used;
-            entry.confirmed = used >= self.settings.confirm_sightings;
-        }
-        Outcome::Founded { landmark: id }
     }
 
     /// Leaves out tentative landmarks that were not seen again, nameless bearings that ended, and poses at which

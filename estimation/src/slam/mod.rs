@@ -13,7 +13,8 @@
 //!
 //! **The parts.** `initialize` places a landmark from one range and bearing or from two bearings; `associate`
 //! decides which landmark was seen; [`BearingTrack`] waits until bearings of one landmark cross well. None of
-//! them knows the filter. [`SlamState`] is the filter's algebra, [`Slam`] takes scans, [`SlamRun`] takes samples.
+//! them knows the filter. [`SlamState`] is the filter's algebra, [`Slam`] takes scans, [`JointSlam`] takes scans with several
+//! maps side by side, [`SlamRun`] takes samples.
 //!
 //! **Cost.** An update of `n` landmarks takes `O(n^2)` and inverts nothing larger than 2x2; a new landmark takes `O(n)`.
 
@@ -26,10 +27,12 @@ mod state;
 
 pub use associate::{Candidate, Choice, associate};
 pub use bearings::{BearingTrack, DelayedRules, KeptBearing};
-pub use filter::{Association, MapEntry, MapId, Outcome, Slam, SlamSettings};
+pub use filter::{Association, JointRules, JointSlam, MapEntry, MapId, Outcome, Slam, SlamSettings};
 pub use initialize::{Initialized, Sight, from_bearings, from_one};
 pub use run::{Refused, ScanOutcome, SlamRun};
 pub use state::{Block, Innovation, SlamState};
 
+#[cfg(test)]
+mod joint_tests;
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! Samples of one robot, in the order of their stamps, into the filter.
 
-use super::filter::{Outcome, Slam};
+use super::filter::{JointSlam, Outcome, Slam};
 use crate::motion::{DeadReckoning, MotionModel, OdometryRefusal, Step};
 use crate::sample::{Reading, Relative, Sample, SampleRefusal, Target};
 use crate::{LandmarkId, Timestamp};
@@ -14,10 +14,26 @@ pub struct ScanOutcome {
     pub sightings: Vec<(LandmarkId, Outcome)>,
 }
 
+/// One map, or several side by side.
+#[derive(Clone, Debug)]
+enum Filter {
+    One(Box<Slam>),
+    Several(Box<JointSlam>),
+}
+
+impl Filter {
+    fn best(&self) -> &Slam {
+        match self {
+            Self::One(slam) => slam,
+            Self::Several(joint) => joint.best(),
+        }
+    }
+}
+
 /// The filter behind dead reckoning: scans wait until the odometry after them says how far the robot had come.
 #[derive(Clone, Debug)]
 pub struct SlamRun {
-    slam: Slam,
+    filter: Filter,
     reckoning: DeadReckoning,
     waiting: Vec<(Timestamp, Vec<(LandmarkId, Relative)>)>,
     before_odometry: usize,
@@ -27,12 +43,26 @@ impl SlamRun {
     /// Before the first sample.
     pub fn new(slam: Slam, motion: MotionModel) -> Self {
         let reckoning = DeadReckoning::new(motion);
-        Self { slam, reckoning, waiting: Vec::new(), before_odometry: 0 }
+        Self { filter: Filter::One(Box::new(slam)), reckoning, waiting: Vec::new(), before_odometry: 0 }
     }
 
-    /// The filter, as of the last odometry.
+    /// The same with several maps side by side.
+    pub fn joint(slam: JointSlam, motion: MotionModel) -> Self {
+        let reckoning = DeadReckoning::new(motion);
+        Self { filter: Filter::Several(Box::new(slam)), reckoning, waiting: Vec::new(), before_odometry: 0 }
+    }
+
+    /// What all sightings are taken for now, in their order, where later ones can change that; `None` otherwise.
+    pub fn settled_outcomes(&self) -> Option<Vec<Outcome>> {
+        match &self.filter {
+            Filter::One(_) => None,
+            Filter::Several(joint) => Some(joint.outcomes()),
+        }
+    }
+
+    /// The filter, as of the last odometry; the best map of several.
     pub fn slam(&self) -> &Slam {
-        &self.slam
+        self.filter.best()
     }
 
     /// Sightings from before the first odometry, which were left out.
@@ -77,22 +107,29 @@ impl SlamRun {
     fn advance(&mut self, step: &Step, scanned: &mut impl FnMut(&Slam, &ScanOutcome)) -> Result<(), Refused> {
         let whole = step.to.seconds_since(step.from);
         let mut at = step.from;
-        let mut go = |slam: &mut Slam, to: Timestamp| {
+        let mut go = |filter: &mut Filter, to: Timestamp| {
             let share = to.seconds_since(at) / whole;
             if share > 0.0 {
-                slam.propagate(&(step.motion * share), step.covariance.scaled(share));
+                let (motion, noise) = (step.motion * share, step.covariance.scaled(share));
+                match filter {
+                    Filter::One(slam) => slam.propagate(&motion, noise),
+                    Filter::Several(joint) => joint.propagate(&motion, noise),
+                }
                 at = to;
             }
         };
         let due = self.waiting.partition_point(|(time, _)| *time <= step.to);
         for (time, scan) in self.waiting.drain(..due) {
-            go(&mut self.slam, time);
-            let outcomes = self.slam.scan(time, &scan)?;
+            go(&mut self.filter, time);
+            let outcomes = match &mut self.filter {
+                Filter::One(slam) => slam.scan(time, &scan)?,
+                Filter::Several(joint) => joint.scan(time, &scan)?,
+            };
             let names = scan.iter().map(|(name, _)| *name);
             let outcome = ScanOutcome { time, sightings: names.zip(outcomes).collect() };
-            scanned(&self.slam, &outcome);
+            scanned(self.filter.best(), &outcome);
         }
-        go(&mut self.slam, step.to);
+        go(&mut self.filter, step.to);
         Ok(())
     }
 }

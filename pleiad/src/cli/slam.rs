@@ -54,6 +54,8 @@ pub enum AssociationArg {
     Identity,
     /// Nearest neighbour under a gate; names are only used to judge.
     Nearest,
+    /// Several maps side by side until later sightings tell them apart; names are only used to judge.
+    Joint,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -19,6 +19,11 @@ use crate::setup::{self, FilterArgs, ReplayOptions};
 use crate::{folder, output};
 
 pub fn run(args: &SlamArgs) -> anyhow::Result<()> {
+    if args.association == AssociationArg::Joint && args.measure == MeasureArg::Bearing {
+        bail!(
+            "--association joint: a bearing alone does not fix a place; use it with --measure range_bearing"
+        );
+    }
     let options = RunOptions {
         form: match args.error {
             ErrorArg::Invariant => ErrorForm::Invariant,
@@ -27,6 +32,7 @@ pub fn run(args: &SlamArgs) -> anyhow::Result<()> {
         association: match args.association {
             AssociationArg::Identity => Association::Identity,
             AssociationArg::Nearest => Association::Nearest,
+            AssociationArg::Joint => Association::Joint,
         },
         without_ranges: args.measure == MeasureArg::Bearing,
         ..RunOptions::default()

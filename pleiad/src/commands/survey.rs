@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use pleiad_survey::{STUDIES, StudyOptions};
 
 use super::study;
@@ -20,7 +20,13 @@ pub fn run(args: &SurveyArgs) -> anyhow::Result<()> {
     let spinner = output::spinner(&format!("{name}: {}", known.about));
     let study = (known.run)(&StudyOptions { seeds: args.seeds, first_seed: args.first_seed })?;
     spinner.finish_and_clear();
-    study::finish(&study, &out, args.json, &command(name, args))
+    let finished = study::finish(&study, &out, args.json, &command(name, args));
+    match args.seeds {
+        Some(seeds) if finished.is_err() => finished.with_context(|| {
+            format!("with {seeds} seeds intervals may be too wide to bear a claim out; without --seeds there are enough")
+        }),
+        _ => finished,
+    }
 }
 
 fn list() -> String {

@@ -124,9 +124,13 @@ fn of_runs(hits: usize, of: usize) -> String {
     format!("{hits} of {of} runs ({:.1}..{:.1} %)", 100.0 * low, 100.0 * high)
 }
 
+/// So many runs at least make an interval that says something.
+const LEAST_RUNS: usize = 5;
+
 /// A mean over runs in words.
 fn mean(values: &[f64], unit: &str) -> String {
     Estimate::of(values)
+        .filter(|own| own.runs >= LEAST_RUNS)
         .map_or_else(|| "too few to say".to_owned(), |own| with_interval(own.mean, own.interval, unit))
 }
 

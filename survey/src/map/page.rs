@@ -16,7 +16,7 @@ const HALVES: [&str; 2] = ["before the change", "after it"];
 
 type Pick = fn(&Drift) -> f64;
 const ERRORS: [(&str, &str, Pick); 2] =
-    [("a_trans", "-", |drift| drift.trans), ("a_rot", "rad/m", |drift| drift.rot_rad_m)];
+    [("a_trans", "", |drift| drift.trans), ("a_rot", " rad/m", |drift| drift.rot_rad_m)];
 
 pub(super) fn study(trials: &[Trial]) -> Study {
     let mut claims = Vec::new();
@@ -69,7 +69,7 @@ fn recovery(trials: &[Trial], half: usize, numbers: &mut Map<String, Value>) -> 
         numbers.insert(format!("{name}_error_{}", ["first_half", "second_half"][half]), json!(error));
         Some(Claim {
             statement: format!(
-                "{name} = {injected:.3} {unit} {} is recovered with a mean error within {BOUND} (gamma {})",
+                "{name} = {injected:.3}{unit} {} is recovered with a mean error within {BOUND} (gamma {})",
                 HALVES[half], GAMMAS[JUDGED]
             ),
             measured: format!(
@@ -100,7 +100,10 @@ fn extremes(trials: &[Trial]) -> Claim {
     );
     Claim {
         statement: "gamma = 1 never adapts, gamma = 0 follows every step".to_owned(),
-        measured: format!("the one in {still}, the other in {follows} of {} runs, to the bit", trials.len()),
+        measured: format!(
+            "gamma = 1 in {still}, gamma = 0 in {follows} of {} runs, to the bit",
+            trials.len()
+        ),
         holds: still == trials.len() && follows == trials.len(),
     }
 }

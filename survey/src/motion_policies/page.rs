@@ -99,7 +99,9 @@ fn line(runs: &[Run], until: f64, along: impl Fn(&super::Look) -> f64) -> (Vec<f
         let (from, to) = (bin as f64 * width, (bin + 1) as f64 * width);
         let looks = runs.iter().flat_map(|run| &run.looks).filter(|look| (from..to).contains(&along(look)));
         let squares: Vec<f64> = looks.map(|look| look.square_m2).collect();
-        if !squares.is_empty() {
+        // A team that drives no further in its time ends its curve: a few runs that came further are not its mean.
+        let all_there = runs.iter().all(|run| run.looks.iter().any(|look| along(look) >= from));
+        if all_there && !squares.is_empty() {
             xs.push(0.5 * (from + to));
             ys.push((squares.iter().sum::<f64>() / squares.len() as f64).sqrt());
         }

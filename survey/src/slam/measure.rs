@@ -11,8 +11,9 @@ use pleiad_estimation::{LandmarkId, Timestamp};
 use pleiad_sim_peers::Scenario;
 
 use super::input::{Luck, SlamInput};
+use super::judge::Associated;
 use super::page::LikenessSeries;
-use super::run::{Associated, Ran, RunOptions, pose_error, run, seen_map_error};
+use super::run::{Ran, RunOptions, pose_error, run, seen_map_error};
 use super::theorems::{DeterminantWatch, OverLimit, covariance_at_truth, likeness_of, over_limit};
 use crate::error::SurveyError;
 

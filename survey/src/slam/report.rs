@@ -11,8 +11,9 @@ use pleiad_sim_peers::Scenario;
 use serde_json::{Map, Value, json};
 
 use super::input::{Luck, SlamInput};
+use super::judge::Associated;
 use super::page::{LikenessSeries, error_figure, likeness_figure, map_figure, sigma_figure};
-use super::run::{Associated, Ran, RunOptions, per_dimension, pose_error, run, seen_map_error};
+use super::run::{Ran, RunOptions, per_dimension, pose_error, run, seen_map_error};
 use super::theorems::{likeness_of, over_limit};
 use crate::error::SurveyError;
 use crate::monte_carlo::{Estimate, over_seeds, share};
@@ -123,6 +124,9 @@ fn lead(options: &RunOptions) -> String {
     let association = match options.association {
         Association::Identity => "by the names that sightings carry",
         Association::Nearest => "without names, by nearest neighbour under a gate",
+        Association::Joint => {
+            "without names, jointly over time: several maps side by side, until sightings tell which is right"
+        }
     };
     let measured = if options.without_ranges { "bearings alone" } else { "ranges and bearings" };
     let form = match options.form {
@@ -149,7 +153,8 @@ fn figures(input: &SlamInput, judged: &Judged, aligned: &Pose2, whose: &str) -> 
         Shown::Figure(
             sigma_figure(ran, limit_m),
             format!(
-                "{whose}: every landmark's standard deviation falls towards what the vehicle's first covariance leaves it."
+                "{whose}: every landmark's standard deviation falls towards what the vehicle's first \
+                 covariance leaves it. Noise of the wheels between the start and the first sightings keeps it above."
             ),
         ),
         Shown::Figure(
@@ -234,7 +239,7 @@ pub fn on_scenario(scenario: &Scenario, asked: &Asked) -> Result<SlamPage, Surve
     let mut shown = vec![Shown::Table(table), Shown::Prose(said)];
     for (_, _, kept) in &all {
         if let Some((input, judged)) = kept {
-            shown.extend(figures(input, judged, &Pose2::identity(), &format!("seed {first_seed}")));
+            shown.extend(figures(input, judged, &Pose2::identity(), &format!("Seed {first_seed}")));
         }
     }
     let study = Study {
@@ -280,11 +285,11 @@ pub fn on_recording(name: &str, inputs: &[SlamInput], options: &RunOptions) -> R
     let header = [
         "robot",
         "landmarks",
-        "map m",
-        "map moved m",
-        "way m",
-        "way moved m",
-        "known map: way m",
+        "map (m)",
+        "map moved (m)",
+        "way (m)",
+        "way moved (m)",
+        "known map: way (m)",
         "NIS",
         "right",
         "wrong",
@@ -298,7 +303,7 @@ pub fn on_recording(name: &str, inputs: &[SlamInput], options: &RunOptions) -> R
     )
     .numeric();
     let mut text = format!("{name}: every robot alone\n\n");
-    let widths = [5, 9, 7, 11, 7, 11, 16, 6, 7, 6, 6, 8];
+    let widths = [5, 9, 7, 13, 7, 13, 18, 6, 7, 6, 6, 8];
     let line = |cells: &[String]| {
         cells.iter().zip(widths).map(|(cell, width)| format!("{cell:>width$}")).collect::<Vec<_>>().join("  ")
     };

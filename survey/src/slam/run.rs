@@ -6,18 +6,15 @@ use nalgebra::{DMatrix, DVector};
 use pleiad_estimation::geometry::{Matrix3, Vector2, wrap_angle};
 use pleiad_estimation::joint::ErrorForm;
 use pleiad_estimation::slam::{
-    Association, MapEntry, MapId, Outcome, ScanOutcome, Slam, SlamRun, SlamSettings, SlamState,
+    Association, JointRules, JointSlam, MapEntry, MapId, Slam, SlamRun, SlamSettings, SlamState,
 };
 use pleiad_estimation::statistics::{Alignment, PosePair, absolute_trajectory_error, nees};
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{LandmarkId, Pose2, Timestamp};
-use pleiad_recording::RobotRecording;
 
 use super::input::SlamInput;
+use super::judge::{Associated, Judge};
 use crate::error::SurveyError;
-
-/// Truth is interpolated across holes up to this long, seconds.
-const TRUTH_GAP_S: f64 = 0.3;
 
 /// How the filter is run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,42 +56,6 @@ pub struct Moment {
     pub covariance: Symmetric3,
     /// Standard deviation of every landmark in the map, root of the mean over both axes, m.
     pub sigma_m: Vec<(MapId, f64)>,
-}
-
-/// How often sightings found their landmarks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Associated {
-    /// Used for the landmark they were of.
-    pub right: usize,
-    /// Used for another.
-    pub wrong: usize,
-    /// Founded a landmark although it was in the map.
-    pub again: usize,
-    /// Not used because several would explain them, or none well.
-    pub ambiguous: usize,
-    /// Turned away by the gate of their name.
-    pub rejected: usize,
-    /// Bearings that wait for others to cross.
-    pub waiting: usize,
-}
-
-impl Associated {
-    /// Decisions: right, wrong and twice founded.
-    pub fn decided(&self) -> usize {
-        self.right + self.wrong + self.again
-    }
-
-    /// The sum of two.
-    pub fn plus(self, other: Self) -> Self {
-        Self {
-            right: self.right + other.right,
-            wrong: self.wrong + other.wrong,
-            again: self.again + other.again,
-            ambiguous: self.ambiguous + other.ambiguous,
-            rejected: self.rejected + other.rejected,
-            waiting: self.waiting + other.waiting,
-        }
-    }
 }
 
 /// A landmark at the end of a run.
@@ -152,6 +113,7 @@ pub fn run(
         *apart *= options.gate_factor;
     }
     let mut slam = Slam::new(settings, input.start, input.start_noise);
+    let joint = options.association == Association::Joint && !options.known;
     let mut births = BTreeMap::new();
     if options.known {
         let first = input.samples.first().map_or(Timestamp(0), |sample| sample.time);
@@ -160,13 +122,26 @@ pub fn run(
         }
     }
     let mut judge = Judge { births, ..Judge::default() };
-    let mut running = SlamRun::new(slam, input.motion);
+    let mut running = if joint {
+        let rules = JointRules::default();
+        SlamRun::joint(JointSlam::new(settings, rules, input.start, input.start_noise), input.motion)
+    } else {
+        SlamRun::new(slam, input.motion)
+    };
     for sample in input.fed(options.without_ranges) {
         let taken = running.sample(&sample, |slam, scan| {
-            judge.scan(slam, scan, &input.recorded);
+            if joint {
+                judge.names.extend(scan.sightings.iter().map(|(name, _)| *name));
+            } else {
+                judge.scan(slam, scan);
+            }
+            judge.moment(slam, scan.time, &input.recorded);
             watch(slam, scan.time, &judge.births);
         });
         judge.refused += usize::from(taken.is_err());
+    }
+    if let Some(outcomes) = running.settled_outcomes() {
+        judge.settled(&outcomes, settings.confirm_sightings);
     }
     let slam = running.slam().clone();
     if !slam.state().vehicle().is_finite() {
@@ -197,57 +172,6 @@ pub fn run(
         births: judge.births,
         slam,
     })
-}
-
-#[derive(Default)]
-struct Judge {
-    births: BTreeMap<MapId, LandmarkId>,
-    moments: Vec<Moment>,
-    associated: Associated,
-    nis: Vec<f64>,
-    most_waiting_poses: usize,
-    refused: usize,
-}
-
-impl Judge {
-    fn scan(&mut self, slam: &Slam, scan: &ScanOutcome, recorded: &RobotRecording) {
-        for (name, outcome) in &scan.sightings {
-            let count = &mut self.associated;
-            match outcome {
-                Outcome::Used { landmark, nis, dimension } => {
-                    let right = self.births.get(landmark) == Some(name);
-                    *(if right { &mut count.right } else { &mut count.wrong }) += 1;
-                    self.nis.push(nis / *dimension as f64);
-                }
-                Outcome::Founded { landmark } => {
-                    let known = slam.map().iter().any(|entry| {
-                        entry.id != *landmark && entry.confirmed && self.births.get(&entry.id) == Some(name)
-                    });
-                    count.again += usize::from(known);
-                    self.births.insert(*landmark, *name);
-                }
-                Outcome::Rejected { nis, dimension, .. } => {
-                    count.rejected += 1;
-                    self.nis.push(nis / *dimension as f64);
-                }
-                Outcome::Ambiguous => count.ambiguous += 1,
-                Outcome::Waiting => count.waiting += 1,
-                Outcome::Unusable => {}
-            }
-        }
-        self.most_waiting_poses = self.most_waiting_poses.max(slam.waiting_poses());
-        let sigma = |entry: &MapEntry| {
-            let p = slam.state().position_covariance(entry.block, entry.block);
-            (entry.id, (0.5 * (p[(0, 0)] + p[(1, 1)])).sqrt())
-        };
-        self.moments.push(Moment {
-            time: scan.time,
-            pose: slam.state().vehicle(),
-            truth: recorded.truth_at(scan.time, TRUTH_GAP_S),
-            covariance: slam.state().vehicle_covariance(),
-            sigma_m: slam.map().iter().map(sigma).collect(),
-        });
-    }
 }
 
 impl Ran {

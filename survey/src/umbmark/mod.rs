@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
 pub use drive::{Driven, SQUARES};
-pub use shown::{masked, returns, stages};
+pub use shown::{angles, masked, returns, stages};
 pub use trial::Trial;
 
 use crate::error::SurveyError;

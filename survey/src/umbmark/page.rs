@@ -4,7 +4,7 @@ use pleiad_mismatch::calibration::umbmark::{Stage, WheelErrors};
 use pleiad_report::Table;
 use serde_json::{Map, Value, json};
 
-use super::shown::{masked, masked_ends_m, recovered, returns, spread_m, stages};
+use super::shown::{angles, masked, masked_ends_m, recovered, returns, spread_m, stages};
 use super::{NAME, SQUARES, Trial, Trials};
 use crate::monte_carlo::{Estimate, share};
 use crate::study::{Claim, Shown, Study};
@@ -40,7 +40,8 @@ pub(super) fn study(trials: &Trials) -> Study {
         let mut all = own_stages.to_vec();
         all.push(("track alone corrected", &first.track_alone));
         all.push(("c_L and c_R exchanged", &first.swapped));
-        shown.push(stages(&first.calibration, &all));
+        shown.push(stages(&all));
+        shown.push(angles(&first.calibration));
         insert_first(first, &mut numbers);
     }
     shown.push(Shown::Table(spread(own)));
@@ -51,8 +52,9 @@ pub(super) fn study(trials: &Trials) -> Study {
         title: "UMBmark: systematic odometry errors from squares in both directions".to_owned(),
         lead: format!(
             "A robot drives {SQUARES} squares clockwise and {SQUARES} counter-clockwise by its own odometry; the pose is \
-             measured at start and end alone. The centres of gravity of the return errors give the ratio of its wheel \
-             diameters and its track (Borenstein and Feng 1996); straight lines give the scale. The correction is tried on \
+             measured at start and end alone. The centres of gravity of the return errors give E_d, the right wheel's \
+             diameter over the left one's, and E_b, the track over the nominal one (Borenstein and Feng 1996); straight lines \
+             give E_s, the mean diameter over the nominal one. The correction is tried on \
              fresh runs. Over {} seeds.",
             own.len()
         ),

@@ -38,9 +38,10 @@ pub fn returns(stages: &[(&str, &Stage)]) -> Shown {
 }
 
 /// The stages in figures.
-pub fn stages(calibration: &Umbmark, stages: &[(&str, &Stage)]) -> Shown {
+pub fn stages(stages: &[(&str, &Stage)]) -> Shown {
     let mut table = Table::new(
-        "Centres of gravity of the return errors.",
+        "Centres of gravity of the return errors, of clockwise (cw) and counter-clockwise (ccw) runs; how much single runs scatter \
+         about them; and the greater of the distances of both centres from the start.",
         ["", "x_cg cw (m)", "y_cg cw (m)", "x_cg ccw (m)", "y_cg ccw (m)", "spread (m)", "E_max,syst (m)"],
     )
     .numeric();
@@ -50,16 +51,28 @@ pub fn stages(calibration: &Umbmark, stages: &[(&str, &Stage)]) -> Shown {
         let cells = [x_cw, y_cw, x_ccw, y_ccw, spread, stage.e_max_syst_m].map(|value| format!("{value:.4}"));
         table = table.row(std::iter::once((*name).to_owned()).chain(cells));
     }
+    Shown::Table(table)
+}
+
+/// What the first stage says of the wheels: by how much corners are turned short, how much sides bend, and how well the
+/// two pairs of components that each angle comes from agree.
+pub fn angles(calibration: &Umbmark) -> Shown {
     let angles = &calibration.angles;
-    let pair = |[x, y]: [f64; 2]| format!("{:.3} from x, {:.3} from y", x.to_degrees(), y.to_degrees());
     let half = angles.half_interval_rad.map_or(String::new(), |half| format!(" +- {:.3}", half.to_degrees()));
+    let row = |name: &str, angle_rad: f64, [x, y]: [f64; 2]| {
+        let degrees = |angle_rad: f64| format!("{:.3}", angle_rad.to_degrees());
+        [name.to_owned(), format!("{}{half}", degrees(angle_rad)), degrees(x), degrees(y)]
+    };
+    let caption = format!(
+        "What the centres before the correction say of the wheels: both angles, and each from its x and y components \
+         alone. Where these disagree, errors of another kind act. The sides have a radius of {:.1} m.",
+        calibration.radius_m
+    );
     Shown::Table(
-        table
-            .row(["alpha (deg)".to_owned(), format!("{:.3}{half}", angles.alpha_rad.to_degrees())])
-            .row(["its pairs".to_owned(), pair(angles.alpha_of_pairs_rad)])
-            .row(["beta (deg)".to_owned(), format!("{:.3}{half}", angles.beta_rad.to_degrees())])
-            .row(["its pairs".to_owned(), pair(angles.beta_of_pairs_rad)])
-            .row(["R (m)".to_owned(), format!("{:.1}", calibration.radius_m)]),
+        Table::new(caption, ["angle", "mean of both (deg)", "from x (deg)", "from y (deg)"])
+            .numeric()
+            .row(row("alpha: a corner is turned short by", angles.alpha_rad, angles.alpha_of_pairs_rad))
+            .row(row("beta: a side bends left by", angles.beta_rad, angles.beta_of_pairs_rad)),
     )
 }
 
@@ -68,10 +81,7 @@ pub fn masked() -> [Shown; 2] {
     let (track_m, side_m, e_d) = MASKED;
     let e_b = masking_track(e_d, track_m, side_m, Turning::CounterClockwise);
     let errors = WheelErrors { e_d, e_b, e_s: 1.0 };
-    let ends = DIRECTIONS.map(|turning| {
-        let end = square_end(errors, track_m, side_m, turning);
-        end.x_m.hypot(end.y_m)
-    });
+    let ends = masked_ends_m();
     let prose = format!(
         "Why one direction is not enough: a robot with E_d = {e_d} and nominal track {track_m} m whose actual track is \
          {e_b:.4} of it comes home within {:.1} mm on a {side_m} m square counter-clockwise, with both errors there: sides \

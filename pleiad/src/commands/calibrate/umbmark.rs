@@ -135,7 +135,7 @@ fn of_recordings(calibration: &Umbmark, after: &Stage, held_out: bool) -> Study 
     } else {
         "one run a direction: judged by themselves, which flatters"
     };
-    let mut shown = vec![umbmark::returns(&stages), umbmark::stages(calibration, &stages)];
+    let mut shown = vec![umbmark::returns(&stages), umbmark::stages(&stages), umbmark::angles(calibration)];
     if calibration.e_s.is_none() {
         shown.push(Shown::Prose(
             "No straight run was given: E_s is not known, and E_b is that of wheels of nominal mean diameter. Add recordings of \

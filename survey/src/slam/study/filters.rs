@@ -4,8 +4,8 @@ use pleiad_estimation::statistics::{Alignment, chi_square_interval};
 use pleiad_report::{Axis, Colour, Figure, Table, Trace};
 use serde_json::{Value, json};
 
+use super::super::judge::Associated;
 use super::super::measure::{Ended, Measured, NEES_AT_S, Nees, Watched};
-use super::super::run::Associated;
 use super::{AT_LIMIT, Parts};
 use crate::monte_carlo::{Estimate, share};
 use crate::study::Shown;
@@ -22,7 +22,7 @@ pub(super) fn forms(all: &[Measured], parts: &mut Parts) {
     let below = additive.iter().filter(|ratio| **ratio < AT_LIMIT).count();
     parts.claim(
         "With chance (heading told to 0.1 rad, sensor noise doubled) the invariant filter keeps the limit of theorem 3 exactly, at any \
-         linearization; the additive one falls below it: it gains information that no sensor gave.",
+         linearization; the additive one falls below it: it gains information that no sensor gave",
         format!(
             "least covariance over the limit: invariant {lowest:.7} (worst of {}); additive {} (mean over seeds), below 1 in {below} of {} \
              seeds",
@@ -79,7 +79,7 @@ pub(super) fn consistency(all: &[Measured], parts: &mut Parts) {
     let [map_low, map_high] = map.last().map_or([f64::NAN; 2], |at| at.interval);
     parts.claim(
         "Consistency on the same runs: the invariant filter's NEES over seeds lies in its interval at every time (1 % to fail \
-         anywhere), of the pose and of the map as the vehicle sees it; the additive filter's does not.",
+         anywhere), of the pose and of the map as the vehicle sees it; the additive filter's does not",
         format!(
             "per degree of freedom at 60 to 299 s: pose {} (interval {low:.2} to {high:.2}), map {} (at the end {map_low:.2} to {map_high:.2}); \
              additive: pose {}, map {}",
@@ -138,7 +138,7 @@ pub(super) fn association(all: &[Measured], parts: &mut Parts) {
     ];
     let mut table = Table::new(
         "Nearest neighbour without names: right, wrong, landmarks founded a second time, left open; over all seeds.",
-        ["", "right", "wrong", "twice", "left open", "share right", "95 % interval", "map error m", "way error m"],
+        ["", "right", "wrong", "twice", "left open", "share right", "95 % interval", "map error (m)", "way error (m)"],
     )
     .numeric();
     let mut rows = Vec::new();
@@ -169,7 +169,7 @@ pub(super) fn association(all: &[Measured], parts: &mut Parts) {
     let [(clean, _), (wide, wide_high), (twins, twins_high)] = found[..] else { return };
     let [clean_low, _] = share(clean.right, clean.decided());
     parts.claim(
-        "Association without names: none wrong in the clean case; a gate far too wide and look-alikes make mistakes that are seen.",
+        "Association without names: none wrong in the clean case; a gate far too wide and look-alikes make mistakes that are seen",
         format!(
             "clean: {} of {} wrong or twice; wide gate: {} wrong or twice of {}; look-alikes: {} of {}",
             clean.wrong + clean.again,
@@ -198,7 +198,7 @@ pub(super) fn bearings(all: &[Measured], there: usize, parts: &mut Parts) {
     let error = Estimate::of(&errors);
     let consistent = |anees: &[Anees]| anees.iter().all(Anees::consistent);
     parts.claim(
-        "Bearings alone: landmarks enter once two bearings cross well, five of six at least in every run, and the pose stays consistent.",
+        "Bearings alone: landmarks enter once two bearings cross well, five of six at least in every run, and the pose stays consistent",
         format!(
             "{missed} of {} landmarks missed, at most {worst} in a run; map error {} m; NEES of the pose per degree of freedom at 60 to \
              299 s: {}; at most {poses} past poses at once",

@@ -56,7 +56,7 @@ pub(super) fn determinants(all: &[Measured], parts: &mut Parts) {
         .iter()
         .all(|(_, (growth, compared, singular))| *growth <= ROUNDING && *compared > 0 && *singular == 0);
     parts.claim(
-        "Theorem 1: no determinant of a submatrix of the map covariance grows with an observation (rounding: 1e-8).",
+        "Theorem 1: no determinant of a submatrix of the map covariance grows with an observation (rounding: 1e-8)",
         words.join("; "),
         holds,
     );
@@ -92,7 +92,7 @@ pub(super) fn correlations(all: &[Measured], parts: &mut Parts) {
     parts.claim(
         "Theorem 2: landmark estimates become fully correlated. Heading known (the linear case): every correlation above 0.98 after \
          1200 s, from 300 s on rising in every run, and every difference better known. Heading uncertain: the map keeps a common \
-         turn, and every distance becomes better known.",
+         turn, and every distance becomes better known",
         format!(
             "heading known: least correlation of any two landmarks at 300 s {}, at 1200 s {}, worst run {least:.4}; largest sigma of a \
              difference {} m, then {} m (start: 0.1 m); heading uncertain: largest sigma of a distance {} m, then {} m",
@@ -151,8 +151,8 @@ pub(super) fn grid(scenario: &Scenario, seeds: &[u64]) -> Result<Vec<GridRow>, S
 pub(super) fn limits(grid: &[GridRow], parts: &mut Parts) {
     let mut table = Table::new(
         "Theorem 3, at the truth: standard deviation of a landmark after 300 s (mean over landmarks and ways) and its closed form, \
-         [I, J (l - p0)] P0 [I, J (l - p0)]^T; covariance over closed form, least in any direction; variance beyond it, greatest in any direction.",
-        ["start: position m, heading rad", "sensor noise", "process noise", "closed form m", "found m", "least", "beyond m^2"],
+         [I, J (l - p0)] P0 [I, J (l - p0)]^T; least ratio of the covariance to the closed form, and largest excess of a variance over it, in any direction.",
+        ["start: position (m), heading (rad)", "sensor noise", "process noise", "closed form (m)", "found (m)", "least ratio", "largest excess (m^2)"],
     )
     .numeric();
     let (mut least, mut greatest) = (f64::INFINITY, 0.0_f64);
@@ -202,7 +202,7 @@ pub(super) fn limits(grid: &[GridRow], parts: &mut Parts) {
     parts.claim(
         "Theorem 3: a landmark's covariance is bounded below by the vehicle's first covariance carried to it, whatever the sensor; \
          without process noise that is its limit. After 300 s standard deviations are within 2 % of it for every start and sensor, \
-         and what is left is the sensor's: fourfold where its noise doubles, the same for all starts.",
+         and what is left is the sensor's: fourfold where its noise doubles, the same for all starts",
         format!(
             "covariance over closed form at least {least:.7}; standard deviation over closed form without process noise at most \
              {greatest:.4}; what is left grows {fold_low:.2} to {fold_high:.2} times with a doubled sensor noise, and differs between starts by a \
