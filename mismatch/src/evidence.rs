@@ -8,10 +8,10 @@ use pleiad_physics::{RobotModel, Surroundings};
 use pleiad_recording::{Recording, RobotRecording, effect_epoch};
 
 use crate::channel::Channel;
-use crate::parallel;
 use crate::plan::Plan;
 use crate::track::Track;
 use crate::{actuator, body, commanded, gyro, sensors, sightings};
+use pleiad_recording::parallel;
 
 /// What a recording says, prepared once and compared with as many models as wanted.
 pub struct Evidence<'a> {

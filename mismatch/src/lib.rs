@@ -24,7 +24,6 @@ mod evidence;
 mod findings;
 mod gyro;
 mod model;
-mod parallel;
 mod plan;
 mod reckoning;
 mod reference;

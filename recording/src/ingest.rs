@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use pleiad_estimation::RobotId;
+
 use crate::error::RecordingError;
+use crate::parallel;
 use crate::report::{FileReport, Form, IngestReport, SkippedRow};
 use crate::table::{Row, Table, shown};
 use crate::tidy::{Stamped, tidy};
@@ -47,6 +50,28 @@ impl<'a> Ingest<'a> {
     /// Begins to read `root`.
     pub(crate) fn new(root: &'a Path, form: Form, options: ReadOptions) -> Self {
         Self { root, report: IngestReport::new(form), options }
+    }
+
+    /// Reads what belongs to one robot each, on several processors; the report is in the order of the robots.
+    pub(crate) fn of_robots<T: Send>(
+        &mut self,
+        robots: impl IntoIterator<Item = RobotId>,
+        read: impl Fn(&mut Self, RobotId) -> Result<T, RecordingError> + Sync,
+    ) -> Result<BTreeMap<RobotId, T>, RecordingError> {
+        let (root, form, options) = (self.root, self.report.form, self.options);
+        let robots: Vec<RobotId> = robots.into_iter().collect();
+        let parts = parallel::map(&robots, |&robot| {
+            let mut own = Self::new(root, form, options);
+            let result = read(&mut own, robot);
+            (robot, own.report, result)
+        });
+        let mut all = BTreeMap::new();
+        for (robot, report, result) in parts {
+            self.report.warnings.extend(report.warnings);
+            self.report.files.extend(report.files);
+            all.insert(robot, result?);
+        }
+        Ok(all)
     }
 
     /// Adds a warning.

@@ -17,6 +17,7 @@ mod mrclam;
 mod nominal;
 mod number;
 mod open;
+pub mod parallel;
 mod report;
 mod suggest;
 mod table;

@@ -52,10 +52,8 @@ pub fn read_mrclam(
     let mut recording = Recording { name: recording_name(folder), ..Recording::default() };
     recording.landmarks = read_landmarks(&mut ingest)?;
     let subjects = read_barcodes(&mut ingest)?;
-    for &robot in &robots {
-        let read = read_robot(&mut ingest, robot, &robots, &subjects)?;
-        recording.robots.insert(robot, read);
-    }
+    recording.robots = ingest
+        .of_robots(robots.iter().copied(), |ingest, robot| read_robot(ingest, robot, &robots, &subjects))?;
     warn_of_unmapped_targets(&recording, &mut ingest.report.warnings);
     Ok((recording, ingest.report))
 }

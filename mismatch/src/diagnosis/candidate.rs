@@ -12,7 +12,7 @@ use crate::diagnosis::starts::{Placing, Start, onsets, regions, starts};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Column, Row, Stretch, Unit};
-use crate::parallel;
+use pleiad_recording::parallel;
 
 /// An impulse is looked for at so many of the largest residuals.
 const IMPULSES: usize = 8;

@@ -14,7 +14,7 @@ use crate::diagnosis::spread::is_of_spread;
 use crate::diagnosis::term::Whose;
 use crate::diagnosis::unit::Unit;
 use crate::error::MismatchError;
-use crate::parallel;
+use pleiad_recording::parallel;
 
 /// A linear regression of residuals on effects.
 #[derive(Clone, Debug, Default)]

@@ -150,7 +150,7 @@ fn fitted_rivals(units: &[&Unit<'_>], nominal: &Fit, with: &Fit) -> Vec<Rival> {
     let most = strongest.first().map_or(0.0, |(_, scored)| scored.step.gain);
     strongest.retain(|(_, scored)| scored.step.gain > LEAST_SHARE * most);
     strongest.truncate(RIVALS);
-    let fitted = crate::parallel::map(&strongest, |((effect, whose), scored)| {
+    let fitted = pleiad_recording::parallel::map(&strongest, |((effect, whose), scored)| {
         let term: Term = refine(units, &whites, scored).term();
         let fit = fit_beside(units, nominal, term)?;
         // Those that it does not act on stay as they are.

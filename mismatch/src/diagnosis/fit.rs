@@ -11,7 +11,7 @@ use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{White, dot, symmetric};
-use crate::parallel;
+use pleiad_recording::parallel;
 
 /// A linearization is kept as long as steps lower the cost by less than this.
 const RELINEARIZE: f64 = 0.5;

@@ -12,7 +12,7 @@ use crate::diagnosis::fit::{State, residuals};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Column, MOST_AT_ONCE, Stretch, Unit, Values};
-use crate::parallel;
+use pleiad_recording::parallel;
 
 /// An effect at a start.
 pub(crate) struct Request {

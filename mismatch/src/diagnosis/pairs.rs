@@ -16,7 +16,7 @@ use crate::diagnosis::select::{FAMILYWISE, LEAST_GAIN, Pool, fit_beside, whites}
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{Step, White, dot, step};
-use crate::parallel;
+use pleiad_recording::parallel;
 
 /// So many of the strongest pairs are fitted.
 const FITTED: usize = 2;

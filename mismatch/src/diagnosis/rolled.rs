@@ -13,8 +13,8 @@ use crate::diagnosis::run::{Judgement, Prepared};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::findings::{RobotRollOuts, RollOut};
-use crate::parallel;
 use crate::rollout::{ALWAYS, HORIZONS_S, Planned, Rollout};
+use pleiad_recording::parallel;
 
 /// The parameters that anyone would refit first: those of the nominal model that move a predicted pose.
 const REFITTED: [Effect; 2] = [Effect::WheelRadiusError, Effect::TrackWidthError];

@@ -31,7 +31,7 @@ use crate::diagnosis::without_truth::{Moved, again, alone_under, teams, withheld
 use crate::error::MismatchError;
 use crate::evidence::Evidence;
 use crate::findings::{Finding, Findings, Untestable, Verdict};
-use crate::parallel;
+use pleiad_recording::parallel;
 
 /// The spread of a uniform distribution of length one.
 const UNIFORM_SIGMA: f64 = 0.288_675_134_594_812_9;

@@ -14,7 +14,7 @@ use crate::diagnosis::refine::refine;
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{Step, White, step};
-use crate::parallel;
+use pleiad_recording::parallel;
 
 /// Probability that anything is found in a clean recording, over everything that is tried in it.
 pub(crate) const FAMILYWISE: f64 = 0.002;

@@ -16,7 +16,7 @@ use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{Column, Unit};
 use crate::diagnosis::white::{White, step};
 use crate::diagnosis::without_truth::at_own_references;
-use crate::parallel;
+use pleiad_recording::parallel;
 
 /// Of forms, and of effects of spread: what loses less than this describes the data about equally, twice in
 /// log-likelihood: odds of 20.

@@ -56,11 +56,11 @@ pub fn read_folder(
         )?;
         recording.walls = walls.into_values().collect();
     }
-    for &robot in &robots {
-        let read = read_robot(&mut ingest, robot)?;
-        recording.robots.insert(robot, read);
-        compare_with_manifest(&mut ingest, robot, &manifest)?;
-    }
+    recording.robots = ingest.of_robots(robots.iter().copied(), |ingest, robot| {
+        let read = read_robot(ingest, robot)?;
+        compare_with_manifest(ingest, robot, &manifest)?;
+        Ok(read)
+    })?;
     if let Some(nominal) = &recording.nominal {
         for robot in robots.iter().filter(|robot| !nominal.robots.contains_key(robot)) {
             ingest.warn(format!("{NOMINAL}: has no section for robot {robot}"));

@@ -31,8 +31,8 @@ use crate::diagnosis::spread::Spread;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::Unit;
 use crate::findings::Finding;
-use crate::parallel;
 use crate::view::{PartialResidual, Plots, ShapePlot};
+use pleiad_recording::parallel;
 
 /// A rest that gains less than this share of what the forms of a target gain leaves them their names.
 const REST: f64 = 0.05;

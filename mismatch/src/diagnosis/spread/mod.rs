@@ -40,7 +40,7 @@ use crate::diagnosis::spread::family::{Family, Shows};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::Unit;
 use crate::findings::{Undetected, Untestable};
-use crate::parallel;
+use pleiad_recording::parallel;
 
 pub(crate) use known::{is_of_spread, known, known_swap};
 pub(crate) use swap::{Swaps, swaps};

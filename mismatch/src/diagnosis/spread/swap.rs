@@ -23,7 +23,7 @@ use crate::diagnosis::spread::scans::{scans, targets};
 use crate::diagnosis::term::{Term, Whose};
 use crate::diagnosis::unit::{BLOCK_S, Unit};
 use crate::findings::Place;
-use crate::parallel;
+use pleiad_recording::parallel;
 
 /// The nominal model may be off by so many times the noise for reasons of its own.
 const SLACK: f64 = 3.0;
