@@ -35,7 +35,7 @@ fn two_hundred_schedules_keep_every_invariant() {
 }
 
 #[test]
-fn a_limit_on_items_in_memory_holds_and_changes_nothing_else() {
+fn a_limit_on_items_in_memory_holds_and_every_invariant_with_it() {
     let free = Options { evictions: true, ..Options::default() };
     let bounded = Options { most_items: Some(60), ..free.clone() };
     let most = |outcomes: Vec<Outcome>| outcomes.iter().map(|outcome| outcome.most_kept).max().unwrap();

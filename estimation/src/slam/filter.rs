@@ -148,6 +148,15 @@ struct Open {
     noise: Noise,
 }
 
+impl Open {
+    fn all(noises: &Noises, sightings: &[(LandmarkId, Relative)]) -> Result<Vec<Self>, SampleRefusal> {
+        let one = |(index, (_, relative)): (usize, &(LandmarkId, Relative))| {
+            Ok(Self { index, relative: *relative, noise: noises.of(relative)? })
+        };
+        sightings.iter().enumerate().map(one).collect()
+    }
+}
+
 impl Slam {
     /// A vehicle at `pose`, known as well as `noise` says in the body frame, and an empty map.
     pub fn new(settings: SlamSettings, pose: Pose2, noise: Symmetric3) -> Self {
@@ -199,10 +208,7 @@ impl Slam {
         time: Timestamp,
         sightings: &[(LandmarkId, Relative)],
     ) -> Result<Vec<Outcome>, SampleRefusal> {
-        let mut open = Vec::with_capacity(sightings.len());
-        for (index, (_, relative)) in sightings.iter().enumerate() {
-            open.push(Open { index, relative: *relative, noise: self.settings.noises.of(relative)? });
-        }
+        let open = Open::all(&self.settings.noises, sightings)?;
         self.here = None;
         let mut outcomes = vec![Outcome::Unusable; sightings.len()];
         match self.settings.association {

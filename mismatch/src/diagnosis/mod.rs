@@ -45,6 +45,7 @@ mod support;
 mod term;
 mod touch;
 mod unit;
+mod wald;
 mod white;
 mod without_truth;
 

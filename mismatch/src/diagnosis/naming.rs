@@ -15,12 +15,13 @@ use crate::diagnosis::profile::{Profile, is_on};
 use crate::diagnosis::robust::{Robust, robust};
 use crate::diagnosis::scan::rectangles;
 use crate::diagnosis::seldom::{Seen, inflation_everywhere, seen};
-use crate::diagnosis::select::{FAMILYWISE, wald};
+use crate::diagnosis::select::FAMILYWISE;
 use crate::diagnosis::starts::Placing;
 use crate::diagnosis::support::Support;
 use crate::diagnosis::term::Term;
 use crate::diagnosis::touch::touches;
 use crate::diagnosis::unit::{Row, Unit};
+use crate::diagnosis::wald::wald;
 use crate::findings::{Estimate, Place, Verdict};
 
 /// Half the width of a 95 % interval, in standard errors.

@@ -124,11 +124,7 @@ impl JointSlam {
         time: Timestamp,
         sightings: &[(LandmarkId, Relative)],
     ) -> Result<Vec<Outcome>, SampleRefusal> {
-        let mut open = Vec::with_capacity(sightings.len());
-        for (index, (_, relative)) in sightings.iter().enumerate() {
-            let noise = self.first.slam.settings.noises.of(relative)?;
-            open.push(Open { index, relative: *relative, noise });
-        }
+        let open = Open::all(&self.first.slam.settings.noises, sightings)?;
         for branch in self.branches_mut() {
             branch.taken.clear();
         }
