@@ -162,11 +162,12 @@ impl Ledger {
         true
     }
 
-    /// Whether the snapshot it rests on counts words of someone evicted that were not accepted. Only who was
-    /// evicted, or has lost his disk, comes to that: all others have said what they rely on before it was
-    /// decided.
+    /// Whether the snapshot it rests on counts words that are not accepted: of someone evicted, or of someone whose log
+    /// ends earlier, since he has lost them with his disk. Only who is out, or has lost his own disk, comes to that:
+    /// all others have said what they rely on before either is decided.
     pub fn is_contradicted(&self) -> bool {
-        self.closing.as_ref().is_some_and(|closing| closing.contradicted)
+        let beyond = |log: &Log| log.limit.is_some_and(|limit| limit < log.base);
+        self.closing.as_ref().is_some_and(|closing| closing.contradicted) || self.logs.values().any(beyond)
     }
 
     /// Rests on nothing; what is held is kept.
