@@ -41,6 +41,7 @@ mod select;
 mod series;
 mod spread;
 mod starts;
+mod steady;
 mod support;
 mod term;
 mod touch;

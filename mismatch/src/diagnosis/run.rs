@@ -24,6 +24,7 @@ use crate::diagnosis::said::{finding, nuisance};
 use crate::diagnosis::select::{Entry, Pool, Selected, select};
 use crate::diagnosis::series;
 use crate::diagnosis::spread::{self, Spread, SpreadTerm, Swaps};
+use crate::diagnosis::steady;
 use crate::diagnosis::support::{Support, support};
 use crate::diagnosis::term::Term;
 use crate::diagnosis::unit::{Member, Unit};
@@ -146,6 +147,7 @@ pub(crate) fn run(recordings: &[Recording], options: &DiagnoseOptions) -> Result
     let told =
         |robot: RobotId, channel: Channel| spread.shows(robot, channel) || opened.shows(robot, channel);
     rest::doubt(&units, &fit, &told, &mut judgements, &mut notes);
+    steady::doubt(&units, &fit, &mut judgements, &mut notes);
     let found: Vec<&Judgement> = ordered(&judgements);
 
     for (effect, [first, second]) in disguise(&fit.terms) {
