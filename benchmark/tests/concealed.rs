@@ -91,3 +91,20 @@ fn an_effect_of_spread_that_is_left_out_is_not_named() {
         assert_eq!(names(&findings), [(name, Verdict::Named)]);
     }
 }
+
+#[test]
+fn a_parameter_that_would_have_to_differ_over_time_or_targets_is_no_name() {
+    // A clock that drifts is an offset on average, a landmark in the wrong place a scale of all ranges.
+    for (left_out, seed, name) in
+        [("clock_drift", 9600, "clock_offset"), ("landmark_survey_error", 70, "range_scale")]
+    {
+        let (findings, _) = found(&format!("out_of_catalogue/{left_out}/white/{seed}"));
+        assert!(
+            findings.iter().all(|own| own.verdict != Verdict::Named),
+            "{left_out}: {:?}",
+            names(&findings)
+        );
+        let (findings, _) = found(&format!("single/{name}/x1/white/{seed}"));
+        assert_eq!(names(&findings), [(name, Verdict::Named)]);
+    }
+}
