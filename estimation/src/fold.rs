@@ -1,10 +1,15 @@
 //! The fold: one fact at a time, in the order of their keys, into the joint state.
 
+mod window;
+
+pub use window::Relinearization;
+pub(crate) use window::fold_blocks;
+
 use crate::fact::{Boot, EntryId, Fingerprint, Noise, NominalState, Quantity};
 use crate::geometry::{Matrix3, Vector2, Vector3};
 use crate::joint::{ErrorForm, Joint, Participant, Update};
 use crate::measurement::{self, Linearization, Unusable};
-use crate::{BootIndex, RobotId, Sequence, Timestamp};
+use crate::{BootIndex, Pose2, RobotId, Sequence, Timestamp};
 
 /// Raised whenever the same facts would give other bits.
 pub const FOLD_VERSION: u32 = 2;
@@ -19,11 +24,13 @@ pub struct FoldConfig {
     pub form: ErrorForm,
     /// Gate by dimension of the measurement, 1 to 3; infinite to accept everything.
     pub gate: [f64; 3],
+    /// Facts are linearized together; `None` for each where those before it put the robots.
+    pub relinearize: Option<Relinearization>,
 }
 
 impl Default for FoldConfig {
     fn default() -> Self {
-        Self { form: ErrorForm::Invariant, gate: DEFAULT_GATE }
+        Self { form: ErrorForm::Invariant, gate: DEFAULT_GATE, relinearize: None }
     }
 }
 
@@ -36,6 +43,11 @@ impl FoldConfig {
             ErrorForm::Additive => 1,
         };
         let words = [u64::from(FOLD_VERSION), form].into_iter().chain(self.gate.map(f64::to_bits));
+        let together = self.relinearize.iter().flat_map(|how| {
+            let lengths = [how.block_ns, how.ahead_ns, how.cell_ns].map(i64::cast_unsigned);
+            lengths.into_iter().chain([u64::from(how.passes)])
+        });
+        let words = words.chain(together);
         let Fingerprint(bytes) = Fingerprint::of_words(words);
         bytes[..8].iter().fold(0, |hash, byte| hash << 8 | u64::from(*byte))
     }
@@ -67,6 +79,12 @@ impl FactKey {
     #[cfg(feature = "planted")]
     pub(crate) fn again(time: Timestamp, id: EntryId) -> Self {
         Self { time, rank: 2, id }
+    }
+
+    /// The first key that a fact of `time` can have.
+    pub(crate) fn first_at(time: Timestamp) -> Self {
+        let id = EntryId { robot: RobotId(0), boot: BootIndex(0), sequence: Sequence(0) };
+        Self { time, rank: 0, id }
     }
 
     /// The last key that a fact of `time` or earlier can have.
@@ -149,7 +167,32 @@ impl Residual {
     }
 }
 
-/// Folds one fact into the joint state.
+/// The joint that `facts`, in the order of their keys, make of nothing.
+pub fn joint_of(config: &FoldConfig, facts: &[(FactKey, Fact)]) -> Joint {
+    let mut joint = Joint::new(config.form);
+    fold_on(&mut joint, config, facts, &mut |_, _| {});
+    joint
+}
+
+/// Folds all of `facts`, in the order of their keys, into the joint state, and tells what became of each.
+pub fn fold_on(
+    joint: &mut Joint,
+    config: &FoldConfig,
+    facts: &[(FactKey, Fact)],
+    told: &mut dyn FnMut(&FactKey, Residual),
+) {
+    if let Some(how) = &config.relinearize {
+        let mut told = |index: usize, residual, _: &dyn Fn() -> Joint| told(&facts[index].0, residual);
+        fold_blocks(joint, config, how, facts, &mut |_, _| {}, &mut told);
+    } else {
+        for (key, fact) in facts {
+            told(key, fold(joint, config, key, fact));
+        }
+    }
+}
+
+/// Folds one fact into the joint state, linearized where those before it put the robots, whatever the configuration says
+/// of linearizing facts together.
 pub fn fold(joint: &mut Joint, config: &FoldConfig, key: &FactKey, fact: &Fact) -> Residual {
     match fact {
         Fact::Boot(boot) => {
@@ -173,51 +216,78 @@ fn fold_observation(
     observer: &NominalState,
     other: Option<&(BootIndex, NominalState)>,
 ) -> Result<Residual, SkipReason> {
-    let a = key.id.robot;
-    let dimension = dimension(quantity);
-    let noise = noise.filter(|noise| usize::from(noise.dimension) == dimension).ok_or(SkipReason::Noise)?;
-    let noise = measurement::noise_matrix(noise);
+    let noise = measurement::noise_matrix(&usable(quantity, noise)?);
     if let Quantity::Absolute(crate::fact::Absolute::Pose(z)) = quantity
-        && joint.index(a).is_none()
+        && joint.index(key.id.robot).is_none()
     {
-        joint.place(a, key.id.boot, z, &noise, observer);
+        joint.place(key.id.robot, key.id.boot, z, &noise, observer);
         return Ok(Residual::without_measurement(Outcome::Placed));
     }
-    let a_index = participant(joint, a, key.id.boot)?;
-    let mut participants = Vec::with_capacity(2);
-    let linearization: Result<Linearization, Unusable> = match quantity {
-        Quantity::Robot { robot: b, relative } => {
-            if *b == a {
-                return Err(SkipReason::Itself);
-            }
-            let (boot, state) = other.ok_or(SkipReason::NotPlaced(*b))?;
-            let b_index = participant(joint, *b, *boot)?;
-            joint.propagate(a_index, observer);
-            joint.propagate(b_index, state);
-            let (xa, xb) = (pose(joint, a, observer), pose(joint, *b, state));
-            measurement::of_robot(relative, &xa, &xb).inspect(|at| {
-                participants.push(Participant { index: a_index, jacobian: -at.jacobian });
-                participants.push(Participant { index: b_index, jacobian: at.jacobian });
-            })
+    let taken = taken(joint, key, quantity, observer, other)?;
+    let mut poses = Vec::with_capacity(2);
+    for (index, state) in &taken {
+        joint.propagate(*index, state);
+        poses.push(joint.part(*index).correction.compose(&state.nominal));
+    }
+    let at = linearize(quantity, &poses)?;
+    let sides = taken.iter().zip(signs(quantity));
+    let mut participants: Vec<Participant> = sides
+        .map(|((index, _), sign)| Participant { index: *index, jacobian: at.jacobian * *sign })
+        .collect();
+    update(joint, config, &at, &noise, &mut participants)
+}
+
+/// The noise, if it fits what was measured.
+fn usable(quantity: &Quantity, noise: Option<&Noise>) -> Result<Noise, SkipReason> {
+    let fits = |noise: &&Noise| usize::from(noise.dimension) == dimension(quantity);
+    noise.filter(fits).copied().ok_or(SkipReason::Noise)
+}
+
+/// Who takes part in a measurement, the observer first, and their nominal states at its time.
+fn taken(
+    joint: &Joint,
+    key: &FactKey,
+    quantity: &Quantity,
+    observer: &NominalState,
+    other: Option<&(BootIndex, NominalState)>,
+) -> Result<Vec<(usize, NominalState)>, SkipReason> {
+    let a = key.id.robot;
+    let mut taken = Vec::with_capacity(2);
+    taken.push((participant(joint, a, key.id.boot)?, *observer));
+    if let Quantity::Robot { robot: b, .. } = quantity {
+        if *b == a {
+            return Err(SkipReason::Itself);
         }
-        Quantity::Landmark { position_m: [x, y], relative, .. } => {
-            joint.propagate(a_index, observer);
-            measurement::of_point(relative, &pose(joint, a, observer), Vector2::new(*x, *y)).inspect(|at| {
-                participants.push(Participant { index: a_index, jacobian: -at.jacobian });
-            })
+        let (boot, state) = other.ok_or(SkipReason::NotPlaced(*b))?;
+        taken.push((participant(joint, *b, *boot)?, *state));
+    }
+    Ok(taken)
+}
+
+/// A measurement at the poses of those who take part, in the order of [`taken`].
+fn linearize(quantity: &Quantity, poses: &[Pose2]) -> Result<Linearization, SkipReason> {
+    let linearized = match (quantity, poses) {
+        (Quantity::Robot { relative, .. }, [a, b]) => measurement::of_robot(relative, a, b),
+        (Quantity::Landmark { position_m: [x, y], relative, .. }, [a]) => {
+            measurement::of_point(relative, a, Vector2::new(*x, *y))
         }
-        Quantity::Absolute(absolute) => {
-            joint.propagate(a_index, observer);
-            let at = measurement::of_map(absolute, &pose(joint, a, observer));
-            participants.push(Participant { index: a_index, jacobian: at.jacobian });
-            Ok(at)
-        }
+        (Quantity::Absolute(absolute), [a]) => Ok(measurement::of_map(absolute, a)),
+        _ => return Err(SkipReason::Noise),
     };
-    let at = linearization.map_err(|unusable| match unusable {
+    linearized.map_err(|unusable| match unusable {
         Unusable::TooClose { .. } => SkipReason::TooClose,
         Unusable::PointHasNoHeading => SkipReason::PointHasNoHeading,
-    })?;
-    update(joint, config, &at, &noise, &mut participants)
+    })
+}
+
+/// What the derivative with respect to the error of each who takes part is multiplied by, in the order of [`taken`]: a
+/// relative measurement moves with the observer the other way.
+fn signs(quantity: &Quantity) -> &'static [f64] {
+    match quantity {
+        Quantity::Robot { .. } => &[-1.0, 1.0],
+        Quantity::Landmark { .. } => &[-1.0],
+        Quantity::Absolute(_) => &[1.0],
+    }
 }
 
 fn update(
@@ -251,10 +321,4 @@ fn participant(joint: &Joint, robot: RobotId, boot: BootIndex) -> Result<usize, 
         Some(member) if member.boot == boot => Ok(index),
         _ => Err(SkipReason::OtherBoot(robot)),
     }
-}
-
-fn pose(joint: &Joint, robot: RobotId, state: &NominalState) -> crate::Pose2 {
-    joint
-        .member(robot)
-        .map_or_else(crate::Pose2::identity, |member| member.correction.compose(&state.nominal))
 }

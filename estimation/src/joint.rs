@@ -3,6 +3,7 @@
 mod covariance;
 
 pub use covariance::JointCovariance;
+pub(crate) use covariance::Prepared;
 
 use crate::fact::{Boot, Continuation, NominalState};
 use crate::geometry::{Matrix3, Vector3};
@@ -245,6 +246,29 @@ impl Joint {
         member.folded_noise = state.noise_sum;
         member.nominal = state.nominal;
         self.covariance.add_diagonal(index, added);
+    }
+
+    /// The part of the robot in a row.
+    pub(crate) fn part(&self, index: usize) -> &Member {
+        &self.members[index]
+    }
+
+    /// Measures a robot's error from another correction. For windows of the fold.
+    pub(crate) fn set_correction(&mut self, index: usize, correction: Pose2) {
+        self.members[index].correction = correction;
+    }
+
+    /// Takes an update from the covariance, and leaves the corrections. For windows of the fold.
+    pub(crate) fn reduce(&mut self, prepared: &Prepared) {
+        self.updates += 1;
+        self.covariance.downdate(prepared);
+    }
+
+    /// Carries a robot's part on to `state` of its nominal trajectory, as an event there would that measures nothing.
+    pub fn carry_to(&mut self, robot: RobotId, state: &NominalState) {
+        if let Some(index) = self.index(robot) {
+            self.propagate(index, state);
+        }
     }
 
     /// One update of the whole joint with an innovation of `dimension` and the given noise, if it passes

@@ -34,9 +34,9 @@ use crate::fact::{
     Answer, Body, Entry, EntryId, Fingerprint, LogId, Noise, NoiseRef, NominalState, Observation, Quantity,
     VoidReason,
 };
-use crate::fold::{Fact, FactKey, FoldConfig, Residual, fold};
+use crate::fold::{Fact, FactKey, FoldConfig, Relinearization, Residual, fold, fold_blocks};
 use crate::joint::Joint;
-use crate::{BootIndex, RobotId};
+use crate::{BootIndex, RobotId, Timestamp};
 
 /// A fact in the order of the fold, and what became of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -360,6 +360,10 @@ impl Ledger {
     /// Brings the estimate up to date with all facts held: goes back to the last snapshot before the
     /// earliest new fact and folds from there.
     pub fn settle(&mut self) -> &Joint {
+        if let Some(how) = self.config.relinearize {
+            self.settle_together(&how);
+            return &self.joint;
+        }
         if let Some(dirty) = self.dirty.take() {
             let base = self.base_joint();
             let (joint, key) = self.snapshots.rewind(dirty, &base);
@@ -374,5 +378,33 @@ impl Ledger {
             self.snapshots.offer(*key, &self.joint);
         }
         &self.joint
+    }
+
+    /// The same where facts are linearized together: from the last block on that no new fact has part in.
+    fn settle_together(&mut self, how: &Relinearization) {
+        let after = self.folded.map_or(std::ops::Bound::Unbounded, std::ops::Bound::Excluded);
+        let next = self.facts.range((after, std::ops::Bound::Unbounded)).next().map(|(key, _)| *key);
+        let Some(first) = self.dirty.take().into_iter().chain(next).min() else { return };
+        let base = self.base_joint();
+        // A fact moves where those of a block before it are linearized, as far ahead as a block looks.
+        let unmoved = Timestamp(first.time.0.saturating_sub(how.ahead_ns));
+        let (mut joint, from) = self.snapshots.rewind(FactKey::first_at(unmoved), &base);
+        let from = from.map_or(std::ops::Bound::Unbounded, std::ops::Bound::Excluded);
+        let facts: Vec<(FactKey, Fact)> = self
+            .facts
+            .range((from, std::ops::Bound::Unbounded))
+            .map(|(key, record)| (*key, record.fact))
+            .collect();
+        let (snapshots, records) = (&mut self.snapshots, &mut self.facts);
+        let mut ended = |end: Timestamp, joint: &Joint| snapshots.keep(FactKey::last_at(end), joint);
+        let mut told = |index: usize, residual, _: &dyn Fn() -> Joint| {
+            if let Some(record) = records.get_mut(&facts[index].0) {
+                record.residual = Some(residual);
+            }
+        };
+        fold_blocks(&mut joint, &self.config, how, &facts, &mut ended, &mut told);
+        self.refolded += facts.len() as u64;
+        self.folded = facts.last().map(|(key, _)| *key);
+        self.joint = joint;
     }
 }

@@ -4,13 +4,16 @@ mod support;
 
 use pleiad_estimation::RobotId;
 use pleiad_estimation::fact::Entry;
-use pleiad_estimation::fold::FoldConfig;
+use pleiad_estimation::fold::{FoldConfig, Relinearization};
 use pleiad_estimation::joint::ErrorForm;
 use pleiad_estimation::ledger::{Insertion, Ledger};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::{Kinds, Options, shuffled, team};
+
+const TOGETHER: Relinearization =
+    Relinearization { block_ns: 2_000_000_000, ahead_ns: 3_000_000_000, passes: 3, cell_ns: 10_000_000_000 };
 
 fn folded_at_once(entries: &[Entry], config: FoldConfig) -> Ledger {
     let mut ledger = Ledger::new(config);
@@ -48,9 +51,10 @@ proptest! {
 
     #[test]
     fn any_order_gives_the_same_bits(seed in 0u64..1_000_000, robots in 2u32..=8, all in any::<bool>(),
-                                     additive in any::<bool>()) {
+                                     additive in any::<bool>(), together in any::<bool>()) {
         let form = if additive { ErrorForm::Additive } else { ErrorForm::Invariant };
-        let config = FoldConfig { form, ..FoldConfig::default() };
+        let relinearize = together.then_some(TOGETHER);
+        let config = FoldConfig { form, relinearize, ..FoldConfig::default() };
         let kinds = if all { Kinds::All } else { Kinds::Relative };
         check_order(seed, &Options { robots, seconds: 20, kinds, config, ..Options::default() });
     }

@@ -43,7 +43,8 @@ fn factored_is_the_centralized_additive_filter_over_a_whole_run() {
         let oracle = JointEkf { form: ErrorForm::Additive, gate: [f64::INFINITY; 3] }.fold(&facts);
         assert!(oracle.nis().count() > 500);
         // The production joint carries the oracle's covariance on to the last odometry.
-        let config = FoldConfig { form: ErrorForm::Additive, gate: [f64::INFINITY; 3] };
+        let config =
+            FoldConfig { form: ErrorForm::Additive, gate: [f64::INFINITY; 3], ..FoldConfig::default() };
         let joint = exact.joint_in(config, team.end());
         for (robot, (_, view)) in &factored.last.views {
             let (_, state) = exact.reckoned(*robot).trajectory.end();

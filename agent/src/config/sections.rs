@@ -40,7 +40,7 @@ impl FilterSection {
             ErrorName::Invariant => ErrorForm::Invariant,
             ErrorName::Additive => ErrorForm::Additive,
         };
-        FoldConfig { form, gate: self.gate }
+        FoldConfig { form, gate: self.gate, relinearize: None }
     }
 }
 

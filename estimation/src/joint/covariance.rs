@@ -20,6 +20,7 @@ pub(crate) struct Prepared {
     // One column of V per row of the measurement, each as long as the state.
     columns: [Vec<f64>; 3],
     whitened: Vector3,
+    factor: Matrix3,
 }
 
 impl Prepared {
@@ -41,6 +42,33 @@ impl Prepared {
             }
         }
         delta
+    }
+
+    /// The backward pass of the smoother over this update: `y <- y - H^T L^-T (V^T y + u)`, where the state before the
+    /// update is corrected by `-P y` (`bierman1973`).
+    pub(crate) fn take_back(&self, participants: &[Participant], adjoint: &mut [f64]) {
+        let mut along = Vector3::zeros();
+        for k in 0..self.dimension {
+            let mut sum = self.whitened[k];
+            for (a, b) in self.columns[k].iter().zip(adjoint.iter()) {
+                sum += a * b;
+            }
+            along[k] = sum;
+        }
+        for row in (0..self.dimension).rev() {
+            let mut sum = along[row];
+            for k in row + 1..self.dimension {
+                sum -= self.factor[(k, row)] * along[k];
+            }
+            along[row] = sum / self.factor[(row, row)];
+        }
+        for Participant { index, jacobian } in participants {
+            for axis in 0..3 {
+                for k in 0..self.dimension {
+                    adjoint[3 * index + axis] -= jacobian[(k, axis)] * along[k];
+                }
+            }
+        }
     }
 }
 
@@ -74,6 +102,11 @@ impl JointCovariance {
     /// The whole matrix, row-major.
     pub fn to_dense(&self) -> Vec<Vec<f64>> {
         (0..self.size).map(|row| (0..self.size).map(|column| self.entry(row, column)).collect()).collect()
+    }
+
+    /// One row, all columns.
+    pub(crate) fn row(&self, row: usize) -> Vec<f64> {
+        (0..self.size).map(|column| self.entry(row, column)).collect()
     }
 
     pub(crate) fn grow(&mut self) {
@@ -185,7 +218,7 @@ impl JointCovariance {
             }
             whitened[row] = sum / l[(row, row)];
         }
-        Some(Prepared { dimension, columns, whitened })
+        Some(Prepared { dimension, columns, whitened, factor: l })
     }
 
     /// `column += factor * P[:, j]`.

@@ -2,7 +2,7 @@
 
 use super::Ledger;
 use crate::fact::NominalState;
-use crate::fold::fold;
+use crate::fold::{Fact, FactKey, fold, fold_blocks};
 use crate::geometry::Matrix3;
 use crate::joint::{ErrorForm, Joint, extrapolate};
 use crate::symmetric::Symmetric3;
@@ -30,7 +30,8 @@ struct SettledView {
 
 impl Ledger {
     /// Folds all facts once more from the beginning, or from the last cut, and gives, for one robot, its part of the joint after
-    /// each: the *settled* history, in which the estimate at t rests on all facts up to t.
+    /// each: the *settled* history, in which the estimate at t rests on all facts up to t. Where facts are linearized together,
+    /// later ones of the block may have moved the points of linearization.
     pub fn settled_history(&self, robot: RobotId) -> Vec<SettledPoint> {
         let mut joint = self.base_joint();
         let mut points = Vec::new();
@@ -47,6 +48,13 @@ impl Ledger {
         };
         if let Some(cut) = self.cut() {
             add(&joint, cut);
+        }
+        if let Some(how) = &self.config.relinearize {
+            let facts: Vec<(FactKey, Fact)> =
+                self.facts.iter().map(|(key, record)| (*key, record.fact)).collect();
+            let mut told = |index: usize, _, now: &dyn Fn() -> Joint| add(&now(), facts[index].0.time);
+            fold_blocks(&mut joint, &self.config, how, &facts, &mut |_, _| {}, &mut told);
+            return points;
         }
         for (key, record) in &self.facts {
             fold(&mut joint, &self.config, key, &record.fact);

@@ -33,6 +33,13 @@ impl Snapshots {
         self.thin();
     }
 
+    /// Called at the end of every block, where facts are linearized together.
+    pub(super) fn keep(&mut self, key: FactKey, joint: &Joint) {
+        self.folded += 1;
+        self.kept.push(Snapshot { key, count: self.folded, joint: joint.clone() });
+        self.thin();
+    }
+
     /// Drops a snapshot if its neighbours are closer together than half its age.
     fn thin(&mut self) {
         let now = self.folded;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Closing, Decision};
 use crate::fact::{Body, Entry, EntryId, Fingerprint, LogId, SealedLog, WHOLE, length_of};
-use crate::fold::{FactKey, fold};
+use crate::fold::{Fact, FactKey, fold_on};
 use crate::ledger::checkpoint::{Checkpoint, LogBase};
 use crate::ledger::{Ledger, rules};
 use crate::{BootIndex, RobotId, Timestamp};
@@ -16,10 +16,13 @@ impl Ledger {
         let position = |id: &LogId| positions.get(id).copied().unwrap_or(0);
         let mut joint = base.joint.clone();
         let mut counts = base.counts;
-        for (key, record) in self.facts.range(..=FactKey::last_at(cut)) {
-            fold(&mut joint, &self.config, key, &record.fact);
-            counts.add(record);
-        }
+        let closed: Vec<(FactKey, Fact)> = self
+            .facts
+            .range(..=FactKey::last_at(cut))
+            .inspect(|(_, record)| counts.add(record))
+            .map(|(key, record)| (*key, record.fact))
+            .collect();
+        fold_on(&mut joint, &self.config, &closed, &mut |_, _| {});
         let lost = self.pending.values().filter(|observation| observation.time <= cut).count();
         counts.expired += lost;
         counts.void += self.void.keys().filter(|id| self.time_of(**id).is_some_and(|t| t <= cut)).count();
