@@ -24,7 +24,7 @@ pub use model::RobotCorrection;
 pub use sections::{
     AngleNoise, BusMode, BusSection, ClockSection, ErrorName, FaultsSection, FilterSection, LandmarkRow,
     LedgerSection, LengthNoise, MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise,
-    SensorsSection, VelocityName, YawName,
+    RelinearizeSection, SensorsSection, VelocityName, YawName,
 };
 
 /// Why a configuration cannot be used.
@@ -254,6 +254,7 @@ impl AgentConfig {
                 return Err(value(&format!("filter.gate[{index}]"), *gate, "a positive number or inf"));
             }
         }
+        self.check_relinearization()?;
         positive("motion.longest_gap_s", motion.longest_gap_s)?;
         positive("motion.speed_limit_m_s", motion.speed_limit_m_s)?;
         positive("motion.yaw_rate_limit_rad_s", motion.yaw_rate_limit_rad_s)?;
@@ -273,7 +274,7 @@ impl AgentConfig {
         Ok(NodeConfig {
             robot: RobotId(self.robot),
             strategy: self.strategy,
-            fold: self.filter.fold(),
+            fold: self.filter.fold((!self.ledger.members.is_empty()).then_some(self.ledger.cell_s)),
             prior: self.prior.as_ref().map(PriorSection::checked).transpose()?,
             motion: model,
             correction,

@@ -15,7 +15,7 @@ use pleiad_sim_peers::scenario::ManoeuvreKind;
 pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
-pub use values::{AbsoluteArg, LandmarksArg};
+pub use values::{AbsoluteArg, LandmarksArg, RelinearizeArg, VariantArg, VariantFilter};
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
 #[derive(Debug, Parser)]
@@ -44,6 +44,8 @@ pub enum Command {
     Benchmark(Benchmark),
     /// What loss and partitions do to each strategy: the table of strategies by fault level.
     Faults(FaultsArgs),
+    /// Whether the filter is as good as it says, over many runs of a scenario, beside variants of it.
+    Evaluate(EvaluateArgs),
     /// The systems that the joint filter grew from, each as a study with its claims: Kalman filter, gyro, rover and others.
     Survey(SurveyArgs),
     /// Vehicle and map at once: EKF SLAM on a scenario or a recording.
@@ -108,6 +110,9 @@ pub struct RunArgs {
     /// Coordinates of the filter's error.
     #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
     pub error: ErrorArg,
+    /// Linearize facts together: blocks of so many seconds, smoothed so far beyond, in so many passes, as in 5:5:4.
+    #[arg(long, value_name = "BLOCK_S:AHEAD_S:PASSES")]
+    pub relinearize: Option<RelinearizeArg>,
     /// A file of fault tables: what goes wrong between the robots and with their processes (docs/faults.md);
     /// those of the scenario itself if absent.
     #[arg(long, value_name = "FILE")]
@@ -135,6 +140,9 @@ pub struct ReplayArgs {
     /// Coordinates of the filter's error.
     #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
     pub error: ErrorArg,
+    /// Linearize facts together: blocks of so many seconds, smoothed so far beyond, in so many passes, as in 5:5:4.
+    #[arg(long, value_name = "BLOCK_S:AHEAD_S:PASSES")]
+    pub relinearize: Option<RelinearizeArg>,
     /// Which landmarks the robots know: known, none, or numbers as in 6,7.
     #[arg(long, default_value = "known")]
     pub landmarks: LandmarksArg,
@@ -288,6 +296,34 @@ pub struct ConcealedArgs {
     #[arg(long, requires = "out")]
     pub resume: bool,
     /// Folder for the sealed answers, the results, summary.json and concealed.md; a new one under runs/ if absent.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// One JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct EvaluateArgs {
+    /// The scenario; docs/scenario.md lists its keys.
+    pub scenario: PathBuf,
+    /// How many runs, each a world of its own.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=100_000))]
+    pub seeds: u64,
+    /// The first seed; the scenario's own if absent.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Length of a run in simulated seconds; the scenario's own if absent.
+    #[arg(long)]
+    pub seconds: Option<f64>,
+    /// Filters, all on the same facts: additive, invariant, iterated:N (each measurement in N passes), or
+    /// BLOCK_S:AHEAD_S:PASSES (facts linearized together). What is said of errors is said relative to the first.
+    #[arg(long, value_delimiter = ',', default_value = "additive,invariant,iterated:4,5:5:4")]
+    pub variants: Vec<VariantArg>,
+    /// How many times of a run it is judged at, equally far apart.
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    pub times: u32,
+    /// Folder for the report and the numbers; a new one under runs/ if absent.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// One JSON object on stdout.

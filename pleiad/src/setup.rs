@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 pub use beside::{MODEL, copy_model, write_beside};
 use beside::{model_for, priors_beside};
 
-use crate::cli::{AbsoluteArg, ErrorArg, LandmarksArg};
+use crate::cli::{AbsoluteArg, ErrorArg, LandmarksArg, RelinearizeArg};
 
 /// Truth is interpolated across holes up to this long.
 pub const TRUTH_GAP_S: f64 = 0.3;
@@ -84,6 +84,7 @@ impl Team {
 pub struct FilterArgs {
     pub strategy: StrategyKind,
     pub error: ErrorArg,
+    pub relinearize: Option<RelinearizeArg>,
 }
 
 impl FilterArgs {
@@ -92,7 +93,8 @@ impl FilterArgs {
             ErrorArg::Invariant => ErrorName::Invariant,
             ErrorArg::Additive => ErrorName::Additive,
         };
-        FilterSection { error, gate: filter.gate }
+        let relinearize = self.relinearize.map(|how| how.0).or(filter.relinearize);
+        FilterSection { error, gate: filter.gate, relinearize }
     }
 }
 

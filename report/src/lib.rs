@@ -35,10 +35,10 @@ pub use figure::{Axis, Figure};
 pub use number::{quantity, with_interval};
 pub use palette::{Colour, Dash, OKABE_ITO};
 pub use reports::{
-    Claim, DemoCase, DemoReport, DiagnoseReport, DiagnosedRecording, Evidence, FactCount, FaultsReport,
-    FaultsRow, Found, HorizonError, NotTested, ParameterEstimate, ReplayReport, ResidualColumns,
-    RobotRollOut, RobotScore, STAGES, ShapeColumns, SmallestDetectable, StageTest, demo_report,
-    diagnose_report, faults_report, replay_report, run_report,
+    Claim, DemoCase, DemoReport, DiagnoseReport, DiagnosedRecording, EvaluateReport, EvaluateRow, Evidence,
+    FactCount, FaultsReport, FaultsRow, Found, HorizonError, NotTested, ParameterEstimate, ReplayReport,
+    ResidualColumns, RobotRollOut, RobotScore, STAGES, ShapeColumns, SmallestDetectable, StageTest,
+    demo_report, diagnose_report, evaluate_report, faults_report, replay_report, run_report,
 };
 pub use series::{Landmark, NisPoint, NisSeries, RobotSeries, TeamSeries};
 pub use summary::{summary_text, write_summary};

@@ -13,6 +13,7 @@ pub mod error;
 pub mod feed;
 pub mod fleet;
 mod injected;
+pub mod reckoning;
 pub mod scenario;
 pub mod simulation;
 pub mod strategies;

@@ -15,12 +15,11 @@ use pleiad_estimation::fold::{FoldConfig, fold};
 use pleiad_estimation::geometry::{Matrix3, Vector3, wrap_angle};
 use pleiad_estimation::joint::Joint;
 use pleiad_estimation::ledger::Ledger;
-use pleiad_estimation::motion::{DeadReckoning, Step};
-use pleiad_estimation::nominal::NominalTrajectory;
-use pleiad_estimation::sample::{Reading, Sample};
+use pleiad_estimation::sample::Sample;
 use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_sim_peers::agents;
+use pleiad_sim_peers::reckoning::Reckoned;
 use pleiad_sim_peers::scenario::RobotSettings;
 use pleiad_sim_peers::{Fleet, FleetOptions, MemberOutcome, Scenario, SimulatedRun, simulate};
 
@@ -64,14 +63,6 @@ pub struct TeamRun {
     pub agreed: bool,
     /// Dead reckoning of every robot, made from its samples once more.
     reckoned: BTreeMap<RobotId, Reckoned>,
-}
-
-/// One robot's odometry, integrated.
-pub struct Reckoned {
-    /// `N(t)` and `C(t)`.
-    pub trajectory: NominalTrajectory,
-    /// The motion between each two odometry samples.
-    pub steps: Vec<Step>,
 }
 
 /// One robot's published estimate against the truth.
@@ -154,8 +145,10 @@ impl Team {
     /// Ends the run of a fleet that was fed by hand.
     pub fn finish(self, mut fleet: Fleet) -> TeamRun {
         let agreed = fleet.settle(self.end(), SETTLING_ROUNDS);
-        let reckoned =
-            self.configs.iter().map(|(robot, config)| (*robot, reckon(config, &self.samples[robot])));
+        let reckoned = self.configs.iter().map(|(robot, config)| {
+            let reckoned = Reckoned::of(config, &self.samples[robot]);
+            (*robot, reckoned.expect("usable odometry"))
+        });
         TeamRun { reckoned: reckoned.collect(), outcomes: fleet.into_outcomes(), agreed, team: self }
     }
 }
@@ -261,24 +254,6 @@ impl TeamRun {
 fn additive(truth: &Pose2, estimate: &Pose2) -> Vector3 {
     let offset = truth.position() - estimate.position();
     Vector3::new(offset.x, offset.y, wrap_angle(truth.yaw_rad() - estimate.yaw_rad()))
-}
-
-fn reckon(config: &NodeConfig, samples: &[Sample]) -> Reckoned {
-    let odometry = |sample: &&Sample| {
-        matches!(sample.reading, Reading::Velocity { .. } | Reading::Wheels { .. } | Reading::Increment(_))
-    };
-    let start = samples.iter().find(odometry).expect("odometry").time;
-    let nominal = config.prior.map_or_else(Pose2::identity, |prior| prior.pose);
-    let mut reckoned =
-        Reckoned { trajectory: NominalTrajectory::new(start, nominal, usize::MAX), steps: Vec::new() };
-    let mut dead_reckoning = DeadReckoning::new(config.motion);
-    for sample in samples.iter().filter(odometry) {
-        if let Some(step) = dead_reckoning.odometry(*sample).expect("usable odometry") {
-            reckoned.trajectory.extend(&step);
-            reckoned.steps.push(step);
-        }
-    }
-    reckoned
 }
 
 /// The settings as if all noises were `told` times what they are.

@@ -47,6 +47,39 @@ impl AgentConfig {
     }
 }
 
+/// More passes than this change nothing that is not wrong.
+const MOST_PASSES: u32 = 50;
+
+impl AgentConfig {
+    /// Facts can be linearized together over times that make sense, in the invariant form.
+    pub(super) fn check_relinearization(&self) -> Result<(), ConfigError> {
+        let Some(how) = self.filter.relinearize else { return Ok(()) };
+        positive("filter.relinearize.block_s", how.block_s)?;
+        not_negative("filter.relinearize.ahead_s", how.ahead_s)?;
+        if !(1..=MOST_PASSES).contains(&how.passes) {
+            return Err(value("filter.relinearize.passes", f64::from(how.passes), "1 to 50"));
+        }
+        let wrong = |key: &str, found: String, expected| {
+            Err(ConfigError::Value { key: key.to_owned(), found, expected })
+        };
+        if self.filter.error == ErrorName::Additive {
+            let expected = "\"invariant\" beside filter.relinearize: in the additive form an error is another one at another time";
+            return wrong("filter.error", "\"additive\"".to_owned(), expected);
+        }
+        if self.strategy != StrategyKind::Exact {
+            let expected = "\"exact\" beside filter.relinearize: no other strategy keeps facts";
+            return wrong("strategy", format!("\"{}\"", self.strategy), expected);
+        }
+        let [cell_ns, block_ns] =
+            [self.ledger.cell_s, how.block_s].map(|seconds| Timestamp::from_seconds(seconds).0.max(1));
+        if !self.ledger.members.is_empty() && cell_ns % block_ns != 0 {
+            let expected = "a multiple of filter.relinearize.block_s";
+            return Err(value("ledger.cell_s", self.ledger.cell_s, expected));
+        }
+        Ok(())
+    }
+}
+
 impl PriorSection {
     pub(super) fn checked(&self) -> Result<Prior, ConfigError> {
         for (key, number) in [("x_m", self.x_m), ("y_m", self.y_m), ("heading_rad", self.heading_rad)] {

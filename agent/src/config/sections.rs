@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use pleiad_estimation::fold::{DEFAULT_GATE, FoldConfig};
+use pleiad_estimation::Timestamp;
+use pleiad_estimation::fold::{DEFAULT_GATE, FoldConfig, Relinearization};
 use pleiad_estimation::joint::ErrorForm;
 use serde::{Deserialize, Serialize};
 
@@ -25,22 +26,49 @@ pub struct FilterSection {
     pub error: ErrorName,
     /// Gate on the normalized innovation squared for measurements of dimension 1, 2, 3.
     pub gate: [f64; 3],
+    /// Facts are linearized together, not each where those before it put the robots.
+    pub relinearize: Option<RelinearizeSection>,
+}
+
+/// `[filter.relinearize]`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RelinearizeSection {
+    /// Length of the blocks that are folded once, s.
+    pub block_s: f64,
+    /// How far beyond a block its facts are smoothed, s.
+    pub ahead_s: f64,
+    /// Passes over the facts of a block, the last of them included.
+    pub passes: u32,
+}
+
+impl Default for RelinearizeSection {
+    fn default() -> Self {
+        Self { block_s: 5.0, ahead_s: 5.0, passes: 4 }
+    }
 }
 
 impl Default for FilterSection {
     fn default() -> Self {
-        Self { error: ErrorName::Invariant, gate: DEFAULT_GATE }
+        Self { error: ErrorName::Invariant, gate: DEFAULT_GATE, relinearize: None }
     }
 }
 
 impl FilterSection {
-    /// The filter's configuration.
-    pub fn fold(&self) -> FoldConfig {
+    /// The filter's configuration; `cell_s` is the distance of the times at which the team closes its past, if it does.
+    pub fn fold(&self, cell_s: Option<f64>) -> FoldConfig {
         let form = match self.error {
             ErrorName::Invariant => ErrorForm::Invariant,
             ErrorName::Additive => ErrorForm::Additive,
         };
-        FoldConfig { form, gate: self.gate, relinearize: None }
+        let ns = |seconds| Timestamp::from_seconds(seconds).0;
+        let relinearize = self.relinearize.map(|how| Relinearization {
+            block_ns: ns(how.block_s).max(1),
+            ahead_ns: ns(how.ahead_s),
+            passes: how.passes,
+            cell_ns: cell_s.map_or(0, ns),
+        });
+        FoldConfig { form, gate: self.gate, relinearize }
     }
 }
 

@@ -11,6 +11,9 @@ use crate::geometry::{Matrix3, Vector3, wrap_angle};
 use crate::joint::{ErrorForm, Joint};
 use crate::{Pose2, RobotId, Timestamp};
 
+/// Steps to what the errors of a team have in common; it changes by less than a thousandth of itself after three.
+const COMMON_STEPS: usize = 8;
+
 /// A robot's estimate of itself at its last odometry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
@@ -94,6 +97,44 @@ impl JointView {
         Some((errors, self.covariance.clone()))
     }
 
+    /// The same with the motion that is common to the team taken apart from that of each robot: `X = exp(c) exp(e) X_hat`,
+    /// where [`JointView::deviation`] has `X = exp(x) X_hat` and the covariance stands for `c + e` as for `x`. The two agree
+    /// to first order. Where a robot's own heading is uncertain by tenths of a radian, its `e` has a long lever, and the
+    /// product of both is no longer small beside the relative positions that the team knows well.
+    ///
+    /// `c` is the generalized least-squares estimate of what the errors have in common. The additive form is taken to the
+    /// invariant coordinates first. `None` if a robot has no truth, or the covariance cannot be inverted.
+    pub fn deviation_apart(&self, truth: &BTreeMap<RobotId, Pose2>) -> Option<Deviation> {
+        let size = 3 * self.robots.len();
+        let mut covariance = self.covariance.clone();
+        if self.form == ErrorForm::Additive {
+            let mut turn = DMatrix::zeros(size, size);
+            for (index, (_, pose)) in self.robots.iter().enumerate() {
+                turn.fixed_view_mut::<3, 3>(3 * index, 3 * index).copy_from(&pose.invariant_from_additive());
+            }
+            covariance = &turn * covariance * turn.transpose();
+        }
+        let factor = covariance.clone().cholesky()?;
+        let every = DMatrix::from_fn(size, 3, |row, column| if row % 3 == column { 1.0 } else { 0.0 });
+        let weighted = factor.solve(&every);
+        let information = (every.transpose() * &weighted).cholesky()?;
+        let mut common = Vector3::zeros();
+        let mut errors = DVector::zeros(size);
+        for _ in 0..COMMON_STEPS {
+            for (index, (robot, pose)) in self.robots.iter().enumerate() {
+                let moved = truth.get(robot)?.compose(&pose.inverse());
+                let own = Pose2::exp(-common).compose(&moved).log();
+                errors.fixed_rows_mut::<3>(3 * index).copy_from(&own);
+            }
+            let step = information.solve(&(weighted.transpose() * &errors));
+            common += Vector3::new(step[0], step[1], step[2]);
+        }
+        for (row, error) in errors.iter_mut().enumerate() {
+            *error += common[row % 3];
+        }
+        Some((errors, covariance))
+    }
+
     /// The least eigenvalue of the covariance over the largest: negative if it is indefinite.
     pub fn definiteness(&self) -> f64 {
         let eigenvalues = self.covariance.clone().symmetric_eigenvalues();
@@ -128,9 +169,13 @@ pub fn joint_view(views: &BTreeMap<RobotId, View>) -> Option<JointView> {
     Some(JointView { form, robots, covariance, disagreeing })
 }
 
-/// The joint estimate of one replica of the exact strategy, each robot carried on to its nominal state in
-/// the invariant error. `None` if a robot has no place in the map, or the filter runs in the additive form.
+/// The joint estimate of one replica of the exact strategy, each robot carried on to its nominal state. `None` if a robot has
+/// no place in the map.
 pub fn joint_of_replica(joint: &Joint, states: &BTreeMap<RobotId, NominalState>) -> Option<JointView> {
+    let mut joint = joint.clone();
+    for (robot, state) in states {
+        joint.carry_to(*robot, state);
+    }
     let mut covariance = DMatrix::zeros(3 * states.len(), 3 * states.len());
     let mut robots = Vec::with_capacity(states.len());
     for (i, (robot, state)) in states.iter().enumerate() {
@@ -139,16 +184,7 @@ pub fn joint_of_replica(joint: &Joint, states: &BTreeMap<RobotId, NominalState>)
             let block = joint.covariance().block(row, joint.index(*other)?);
             covariance.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&block);
         }
-        let member = joint.member(*robot)?;
-        let grown = state.noise_sum.minus(member.folded_noise).congruence(&member.correction.adjoint());
-        let mut own = covariance.fixed_view_mut::<3, 3>(3 * i, 3 * i);
-        own += grown.to_matrix();
-        robots.push((*robot, member.correction.compose(&state.nominal)));
+        robots.push((*robot, joint.member(*robot)?.correction.compose(&state.nominal)));
     }
-    (joint.form() == ErrorForm::Invariant).then_some(JointView {
-        form: ErrorForm::Invariant,
-        robots,
-        covariance,
-        disagreeing: 0,
-    })
+    Some(JointView { form: joint.form(), robots, covariance, disagreeing: 0 })
 }

@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use pleiad_agent::config::RelinearizeSection;
 use pleiad_estimation::{LandmarkId, RobotId};
 
 /// `known`, `none`, or a list of numbers.
@@ -26,6 +27,59 @@ impl FromStr for LandmarksArg {
                 .map(Self::Only)
                 .map_err(|_| format!("found {text:?}, expected known, none, or numbers as in 6,7")),
         }
+    }
+}
+
+/// `BLOCK_S:AHEAD_S:PASSES`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelinearizeArg(pub RelinearizeSection);
+
+impl FromStr for RelinearizeArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parsed = || {
+            let mut parts = text.split(':');
+            let (block, ahead, passes) = (parts.next()?, parts.next()?, parts.next()?);
+            let (block_s, ahead_s) = (block.parse().ok()?, ahead.parse().ok()?);
+            let whole = parts.next().is_none();
+            whole.then_some(Self(RelinearizeSection { block_s, ahead_s, passes: passes.parse().ok()? }))
+        };
+        parsed().ok_or_else(|| format!("found {text:?}, expected BLOCK_S:AHEAD_S:PASSES as in 5:5:4"))
+    }
+}
+
+/// A filter to be judged, as it was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VariantArg {
+    pub name: String,
+    pub filter: VariantFilter,
+}
+
+/// What a variant does with the facts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VariantFilter {
+    Additive,
+    Invariant,
+    /// Each measurement in so many passes.
+    Iterated(u32),
+    Relinearized(RelinearizeSection),
+}
+
+impl FromStr for VariantArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let filter = match text.split_once(':') {
+            None if text == "additive" => Some(VariantFilter::Additive),
+            None if text == "invariant" => Some(VariantFilter::Invariant),
+            Some(("iterated", passes)) => passes.parse().ok().map(VariantFilter::Iterated),
+            _ => text.parse().ok().map(|RelinearizeArg(how)| VariantFilter::Relinearized(how)),
+        };
+        let filter = filter.ok_or_else(|| {
+            format!("found {text:?}, expected additive, invariant, iterated:N, or BLOCK_S:AHEAD_S:PASSES as in 5:5:4")
+        });
+        Ok(Self { name: text.to_owned(), filter: filter? })
     }
 }
 

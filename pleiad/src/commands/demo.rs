@@ -112,7 +112,7 @@ fn run_case(args: &DemoArgs, name: &str, text: &str, out: &Path) -> anyhow::Resu
         .with_context(|| format!("cannot write {}", path.display()))?;
     let scenario = Scenario::load(&path)?;
     let world = simulate(&scenario, args.seed)?;
-    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant };
+    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant, relinearize: None };
     let mut team = setup::simulated(&scenario, world, filter);
     team.notes.extend(cut_off(&team));
     let options = ProcessOptions {

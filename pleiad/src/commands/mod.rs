@@ -7,6 +7,7 @@ mod coordinator;
 mod demo;
 mod diagnose;
 mod effects;
+mod evaluate;
 mod evict;
 mod faults;
 mod observability;
@@ -19,6 +20,7 @@ mod simulate;
 mod slam;
 mod study;
 mod survey;
+mod worlds;
 
 pub use runner::Survived;
 
@@ -35,6 +37,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Benchmark(Benchmark::Concealed(args)) => concealed::run(&args),
         Command::Faults(args) => faults::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
         Command::Slam(args) => slam::run(&args),
         Command::Survey(args) => survey::run(&args),
         Command::Calibrate(command) => calibrate::run(&command),

@@ -49,7 +49,7 @@ pub fn of_run(result: &RunResult) -> anyhow::Result<Observability> {
 }
 
 pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
-    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant };
+    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant, relinearize: None };
     let team = if args.input.is_dir() {
         if args.seed.is_some() {
             bail!("--seed: a recording has none; it is for scenarios");

@@ -80,7 +80,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let (recording, ingest) =
         pleiad_recording::open(&folder, &ReadOptions { skip_bad_rows: args.skip_bad_rows })?;
     let options = ReplayOptions {
-        filter: FilterArgs { strategy: args.strategy, error: args.error },
+        filter: FilterArgs { strategy: args.strategy, error: args.error, relinearize: args.relinearize },
         landmarks: &args.landmarks,
         absolute: &args.absolute,
         start_s: args.start,

@@ -66,7 +66,7 @@ fn of_recording(args: &SlamArgs, options: &RunOptions) -> anyhow::Result<SlamPag
     let team = setup::recorded(
         &recording,
         &ReplayOptions {
-            filter: FilterArgs { strategy: StrategyKind::Exact, error: args.error },
+            filter: FilterArgs { strategy: StrategyKind::Exact, error: args.error, relinearize: None },
             landmarks: &LandmarksArg::Known,
             absolute: &[],
             start_s: args.start,

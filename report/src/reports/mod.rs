@@ -2,6 +2,7 @@
 
 mod demo;
 pub(crate) mod diagnose;
+mod evaluate;
 mod faults;
 mod replay;
 
@@ -10,6 +11,7 @@ pub use diagnose::{
     Claim, DiagnoseReport, DiagnosedRecording, Evidence, Found, HorizonError, NotTested, ParameterEstimate,
     ResidualColumns, RobotRollOut, STAGES, ShapeColumns, SmallestDetectable, StageTest, diagnose_report,
 };
+pub use evaluate::{EvaluateReport, EvaluateRow, evaluate_report};
 pub use faults::{FaultsReport, FaultsRow, faults_report};
 pub use replay::{FactCount, ReplayReport, RobotScore, replay_report, run_report};
 

@@ -18,11 +18,12 @@ use serde::Serialize;
 
 use crate::cli::{ErrorArg, FaultsArgs, LandmarksArg};
 use crate::commands::replay::command_line;
+use crate::commands::worlds::{Truth, World};
 use crate::output;
 use crate::setup::{self, FilterArgs, ReplayOptions};
 use levels::Level;
 use rows::Row;
-use run::{RunScore, Truth, Window, World};
+use run::{RunScore, Window};
 
 /// `faults --json` and `summary.json`.
 #[derive(Debug, Serialize)]
@@ -70,7 +71,7 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
 
 /// The worlds, one per seed, and the faults of the file.
 fn worlds(args: &FaultsArgs) -> anyhow::Result<(FaultPlan, Vec<World>, Vec<String>)> {
-    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant };
+    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant, relinearize: None };
     let own = args.faults.as_deref().map(FaultPlan::load).transpose()?;
     if args.input.is_dir() {
         let folder = setup::recording_folder(&args.input);

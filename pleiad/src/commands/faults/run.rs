@@ -2,73 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::Context;
-use pleiad_agent::NodeConfig;
-use pleiad_agent::config::AgentConfig;
 use pleiad_bus::FaultPlan;
 use pleiad_estimation::fact::{Body, Entry, Quantity};
 use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::reference::{JointEkf, JointEstimate, facts_from_entries};
-use pleiad_estimation::sample::Sample;
 use pleiad_estimation::strategy::{Counts, Deviation, JointView, Strategy, StrategyKind};
-use pleiad_estimation::{Pose2, RobotId, Timestamp};
-use pleiad_recording::Recording;
+use pleiad_estimation::{Pose2, RobotId};
 use pleiad_sim_peers::strategies::{Snapshot, StrategyOptions, StrategyOutcome, run};
-use pleiad_sim_peers::world::Track;
 
-use crate::setup::{TRUTH_GAP_S, Team};
+use crate::commands::worlds::World;
 
 /// Times within the fault at which consistency is judged, as shares of it.
 const JUDGED: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 /// From the end of a fault until the team counts as healed, s.
 const HEALING_S: f64 = 5.0;
-
-/// A team, its samples and its truth: one realization.
-pub struct World {
-    pub seed: u64,
-    pub configs: BTreeMap<RobotId, NodeConfig>,
-    pub samples: BTreeMap<RobotId, Vec<Sample>>,
-    pub truth: Truth,
-    pub seconds: f64,
-}
-
-/// Where the robots really were.
-pub enum Truth {
-    /// Of a simulation, at any time.
-    Tracks(BTreeMap<RobotId, Track>),
-    /// Of a recording.
-    Recorded(Box<Recording>),
-}
-
-impl Truth {
-    fn at(&self, robot: RobotId, time: Timestamp) -> Option<Pose2> {
-        match self {
-            Self::Tracks(tracks) => tracks.get(&robot).map(|track| track.pose_at(time)),
-            Self::Recorded(recording) => recording.truth_at(robot, time, TRUTH_GAP_S),
-        }
-    }
-}
-
-impl World {
-    /// Of a team that is configured for the exact strategy.
-    pub fn new(team: Team, truth: Truth, seed: u64) -> anyhow::Result<Self> {
-        let (first, last) = team.span().context("there is not a single sample to run on")?;
-        let configs: Result<BTreeMap<_, _>, _> =
-            team.agents.iter().map(|(robot, agent)| Ok((*robot, node(agent)?))).collect();
-        Ok(Self {
-            seed,
-            configs: configs.map_err(|error: pleiad_agent::ConfigError| error)?,
-            samples: team.samples,
-            truth,
-            seconds: last.seconds_since(first),
-        })
-    }
-}
-
-/// The estimates are asked for when looked at; those that an agent publishes are not needed.
-fn node(agent: &AgentConfig) -> Result<NodeConfig, pleiad_agent::ConfigError> {
-    Ok(NodeConfig { estimate_rate_hz: 0.01, ..agent.node()? })
-}
 
 /// When a fault begins and ends, seconds into the run.
 #[derive(Clone, Copy, Debug, PartialEq)]
