@@ -152,7 +152,13 @@ fn fold_stretch(
     for (index, event) in events.iter().enumerate().take(count) {
         let residual = match event {
             Ok(event) => {
-                pass.take(config, event, points.as_ref().map(|points: &Points| points[index].as_slice())).0
+                pass.take(
+                    config,
+                    event,
+                    points.as_ref().map(|points: &Points| points[index].as_slice()),
+                    false,
+                )
+                .0
             }
             Err(reason) => Residual::without_measurement(Outcome::Skipped(*reason)),
         };
@@ -178,7 +184,7 @@ fn smoothed(
     let mut pass = Pass::new(joint.clone());
     let traces = events.iter().enumerate().map(|(index, event)| {
         let at = points.map(|points| points[index].as_slice());
-        event.as_ref().ok().map(|event| pass.take(config, event, at).1)
+        event.as_ref().ok().map(|event| pass.take(config, event, at, true).1)
     });
     let traces: Vec<Option<Trace>> = traces.collect();
     let mut adjoint = vec![0.0; joint.covariance().size()];
@@ -219,7 +225,13 @@ impl Pass {
     }
 
     /// Takes a measurement, linearized with its participants' corrections at `at`, or where they are thought to be.
-    fn take(&mut self, config: &FoldConfig, event: &Event<'_>, at: Option<&[Pose2]>) -> (Residual, Trace) {
+    fn take(
+        &mut self,
+        config: &FoldConfig,
+        event: &Event<'_>,
+        at: Option<&[Pose2]>,
+        lenient: bool,
+    ) -> (Residual, Trace) {
         let mut trace = Trace { at: Vec::with_capacity(2), rows: Vec::with_capacity(2), update: None };
         let mut poses = Vec::with_capacity(2);
         for (which, (index, state)) in event.participants.iter().enumerate() {
@@ -254,14 +266,18 @@ impl Pass {
         let dimension = linearized.dimension;
         let threshold = config.gate[dimension - 1];
         let residual = |outcome, nis| Residual { outcome, dimension, innovation, nis };
-        let Some(prepared) =
-            self.joint.covariance().prepare(dimension, &innovation, &event.noise, &participants)
-        else {
+        let prepare =
+            |noise: &Matrix3| self.joint.covariance().prepare(dimension, &innovation, noise, &participants);
+        let Some(mut prepared) = prepare(&event.noise) else {
             return (Residual::without_measurement(Outcome::Skipped(SkipReason::Noise)), trace);
         };
         let nis = prepared.nis();
         if nis > threshold {
-            return (residual(Outcome::Rejected { threshold }, nis), trace);
+            let softer = prepare(&(event.noise * (nis / threshold))).filter(|_| lenient);
+            let Some(softer) = softer else {
+                return (residual(Outcome::Rejected { threshold }, nis), trace);
+            };
+            prepared = softer;
         }
         self.joint.reduce(&prepared);
         for (index, mean) in self.means.iter_mut().enumerate() {
