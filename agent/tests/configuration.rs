@@ -38,6 +38,7 @@ fn read(text: &str) -> Result<AgentConfig, ConfigError> {
 fn full() -> Table {
     let text = "
         model = 'corrected.toml'
+        [filter.relinearize]
         [prior]
         x_m = 0.0
         y_m = 0.0
@@ -409,5 +410,29 @@ fn a_model_that_cannot_be_used_is_refused_with_both_files_and_the_key() {
         for part in [path.to_str().unwrap(), name, expected] {
             assert!(error.contains(part), "{part:?} is not in: {error}");
         }
+    }
+}
+
+#[test]
+fn facts_are_linearized_together_over_times_that_make_sense() {
+    let of = |text: &str| read(&format!("{LEAST}{text}")).unwrap().node();
+    let fold = of("[filter]\nrelinearize = { block_s = 2.0, ahead_s = 4.0, passes = 3 }\n").unwrap().fold;
+    let how = fold.relinearize.unwrap();
+    assert_eq!((how.block_ns, how.ahead_ns, how.passes, how.cell_ns), (2_000_000_000, 4_000_000_000, 3, 0));
+    assert_ne!(fold.hash(), of("").unwrap().fold.hash(), "the bits differ, so does the configuration");
+    let closing = "[ledger]\nmembers = [1, 2]\ncell_s = 6.0\n";
+    let how =
+        of(&format!("[filter]\nrelinearize = {{ block_s = 2.0 }}\n{closing}")).unwrap().fold.relinearize;
+    assert_eq!(how.unwrap().cell_ns, 6_000_000_000);
+    for (text, key) in [
+        ("[filter]\nrelinearize = { block_s = 0.0 }\n".to_owned(), "filter.relinearize.block_s"),
+        ("[filter]\nrelinearize = { ahead_s = -1.0 }\n".to_owned(), "filter.relinearize.ahead_s"),
+        ("[filter]\nrelinearize = { passes = 0 }\n".to_owned(), "filter.relinearize.passes"),
+        ("[filter]\nerror = 'additive'\nrelinearize = {}\n".to_owned(), "filter.error"),
+        ("strategy = 'pairwise'\n[filter]\nrelinearize = {}\n".to_owned(), "strategy"),
+        (format!("[filter]\nrelinearize = {{ block_s = 4.0 }}\n{closing}"), "ledger.cell_s"),
+    ] {
+        let said = of(&text).unwrap_err().to_string();
+        assert!(said.contains(key), "{text}: {said}");
     }
 }

@@ -33,4 +33,7 @@ pub struct Options {
     pub evictions: bool,
     /// With so many items in memory a robot observes nothing more; else as by default.
     pub most_items: Option<usize>,
+    /// Facts are linearized together. There is no oracle of that: the estimate is held against one fold of all that is
+    /// accepted.
+    pub relinearize: bool,
 }

@@ -17,6 +17,9 @@ const ROUNDINGS: f64 = 4.0;
 
 /// Whether a ledger believes what the oracle does, or what is off.
 pub fn agrees(joint: &Joint, facts: &[ReferenceFact], fold: &FoldConfig) -> Result<(), String> {
+    if fold.relinearize.is_some() {
+        return at_once(joint, &folded(facts, fold));
+    }
     let form = match fold.form {
         ErrorForm::Invariant => reference::ErrorForm::Invariant,
         ErrorForm::Additive => reference::ErrorForm::Additive,
@@ -69,6 +72,27 @@ pub fn agrees(joint: &Joint, facts: &[ReferenceFact], fold: &FoldConfig) -> Resu
             let fine = apart <= TOLERANCE * largest || apart <= by_rounding(&moved);
             if !fine {
                 return Err(format!("P of {robot} and {other} is {apart:e} off"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether the estimate of a ledger, which came about bit by bit and rests on cuts, is that of all facts folded at once.
+fn at_once(joint: &Joint, whole: &Joint) -> Result<(), String> {
+    let largest = whole.covariance().lower().iter().fold(0.0_f64, |largest, entry| largest.max(entry.abs()));
+    for expected in whole.members() {
+        let robot = expected.robot;
+        let Some(member) = joint.member(robot) else { return Err(format!("robot {robot} is not placed")) };
+        let apart = member.correction.between(&expected.correction).log().amax();
+        if !(apart <= TOLERANCE * (1.0 + expected.correction.position().norm())) {
+            return Err(format!("robot {robot} is {apart:e} off what all facts at once make"));
+        }
+        for other in whole.members().map(|other| other.robot) {
+            let blocks = block(joint, robot, other).zip(block(whole, robot, other));
+            let apart = blocks.map_or(f64::NAN, |(a, b)| (a - b).amax());
+            if !(apart <= TOLERANCE * largest) {
+                return Err(format!("P of {robot} and {other} is {apart:e} off what all facts at once make"));
             }
         }
     }

@@ -53,6 +53,8 @@ pub struct Plan {
     pub evict_after_s: Option<f64>,
     /// With so many items in memory a robot observes nothing more.
     pub most_items: Option<usize>,
+    /// Facts are linearized together.
+    pub relinearize: bool,
     /// The nominal trajectories begin anew that far from their origin, m.
     pub rebase_m: f64,
     /// What links do at first.
@@ -76,6 +78,7 @@ impl Plan {
             cell_s,
             evict_after_s: (chance.happens(0.15) && options.evictions).then_some(8.0),
             most_items: options.most_items,
+            relinearize: options.relinearize,
             rebase_m,
             weather: weather(&mut chance),
             blows: Vec::new(),

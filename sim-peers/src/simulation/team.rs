@@ -28,11 +28,16 @@ pub fn config(plan: &Plan, robot: u32, start: &Pose2) -> Result<NodeConfig, Stri
         let evict = plan.evict_after_s.map_or_else(String::new, |s| format!("evict_after_s = {s:?}\n"));
         format!("members = [{}]\ncell_s = {cell_s:?}\n{evict}", members.join(","))
     });
+    let filter = if plan.relinearize {
+        "[filter]\nrelinearize = { block_s = 0.5, ahead_s = 1.0, passes = 3 }\n"
+    } else {
+        ""
+    };
     let text = format!(
         "team = 'simulation'\nrobot = {robot}\n\
          prior = {{ x_m = {:?}, y_m = {:?}, heading_rad = {:?}, sigma_position_m = 0.1, sigma_heading_rad = 0.05 }}\n\
          landmarks = [{{ id = 7, x_m = 3.0, y_m = -4.0 }}]\n\
-         [ledger]\n{ledger}{most}late_s = 0.5\nrebase_m = {:?}\n\
+         {filter}[ledger]\n{ledger}{most}late_s = 0.5\nrebase_m = {:?}\n\
          [motion]\nlongest_gap_s = 1.0\n\
          [sensors]\n\
          relative_pose = {{ sigma_position_m = 0.05, sigma_yaw_rad = 0.02 }}\n\

@@ -3,7 +3,7 @@
 
 use pleiad_estimation::Pose2;
 use pleiad_estimation::fact::{Absolute, Boot, Noise, NominalState, Quantity};
-use pleiad_estimation::fold::{Fact, FactKey, FoldConfig, fold};
+use pleiad_estimation::fold::{Fact, FactKey, FoldConfig, joint_of};
 use pleiad_estimation::joint::Joint;
 use pleiad_estimation::reference::{FactContent, Measurement, ReferenceFact};
 use pleiad_estimation::sample::Relative;
@@ -99,19 +99,15 @@ pub fn in_units(facts: &[ReferenceFact], scale: f64) -> Vec<ReferenceFact> {
 pub fn folded(facts: &[ReferenceFact], config: &FoldConfig) -> Joint {
     let mut sorted: Vec<&ReferenceFact> = facts.iter().collect();
     sorted.sort_by_key(|fact| fact.order());
-    let mut joint = Joint::new(config.form);
-    for fact in sorted {
-        let (key, content) = match &fact.content {
-            FactContent::Boot(boot) => (FactKey::boot(fact.time, fact.id), Fact::Boot(*boot)),
-            FactContent::Measurement(measured) => {
-                let other = measured.observed.map(|other| (other.boot, other.nominal));
-                let (quantity, noise) = (measured.quantity, Some(measured.noise));
-                let observer = measured.observer.nominal;
-                let content = Fact::Observation { quantity, noise, observer, other };
-                (FactKey::observation(fact.time, fact.id), content)
-            }
-        };
-        fold(&mut joint, config, &key, &content);
-    }
-    joint
+    let facts = sorted.into_iter().map(|fact| match &fact.content {
+        FactContent::Boot(boot) => (FactKey::boot(fact.time, fact.id), Fact::Boot(*boot)),
+        FactContent::Measurement(measured) => {
+            let other = measured.observed.map(|other| (other.boot, other.nominal));
+            let (quantity, noise) = (measured.quantity, Some(measured.noise));
+            let observer = measured.observer.nominal;
+            let content = Fact::Observation { quantity, noise, observer, other };
+            (FactKey::observation(fact.time, fact.id), content)
+        }
+    });
+    joint_of(config, &facts.collect::<Vec<_>>())
 }

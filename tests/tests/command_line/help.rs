@@ -2,7 +2,7 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 15] = [
+const COMMANDS: [&str; 16] = [
     "demo",
     "run",
     "replay",
@@ -11,6 +11,7 @@ const COMMANDS: [&str; 15] = [
     "diagnose",
     "benchmark",
     "faults",
+    "evaluate",
     "slam",
     "effects",
     "agent",

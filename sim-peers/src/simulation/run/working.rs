@@ -57,6 +57,7 @@ pub fn operate(
         cell_s: Some(5.0),
         evict_after_s: None,
         most_items: None,
+        relinearize: false,
         rebase_m: 300.0,
         weather,
         blows,
