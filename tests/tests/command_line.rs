@@ -10,6 +10,8 @@ mod calibrate;
 mod demo;
 #[path = "command_line/errors.rs"]
 mod errors;
+#[path = "command_line/evaluate.rs"]
+mod evaluate;
 #[path = "command_line/help.rs"]
 mod help;
 #[path = "command_line/json.rs"]

@@ -188,3 +188,94 @@ pub fn joint_of_replica(joint: &Joint, states: &BTreeMap<RobotId, NominalState>)
     }
     Some(JointView { form: joint.form(), robots, covariance, disagreeing: 0 })
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::statistics::nees;
+
+    /// A team 8 m from the origin, whose common drift is known to 0.15 rad and 0.5 m, headings of its robots to 0.2 rad beside
+    /// it, and places in its formation to 5 cm.
+    fn view() -> JointView {
+        let poses =
+            [(8.0, 0.0, 0.3), (8.5, 1.0, -2.0), (6.0, -2.0, 1.0)].map(|(x, y, yaw)| Pose2::new(x, y, yaw));
+        let common = DMatrix::from_diagonal(&DVector::from_vec(vec![0.25, 0.25, 0.0225]));
+        let mut covariance = DMatrix::zeros(9, 9);
+        for i in 0..3 {
+            for j in 0..3 {
+                covariance.view_mut((3 * i, 3 * j), (3, 3)).copy_from(&common);
+            }
+            let own = DMatrix::from_diagonal(&DVector::from_vec(vec![0.0025, 0.0025, 0.04]));
+            let turn = DMatrix::from_column_slice(3, 3, poses[i].adjoint().as_slice());
+            let mut block = covariance.view_mut((3 * i, 3 * i), (3, 3));
+            block += &turn * own * turn.transpose();
+        }
+        let robots = [1, 2, 3].map(RobotId).into_iter().zip(poses).collect();
+        JointView { form: ErrorForm::Invariant, robots, covariance, disagreeing: 0 }
+    }
+
+    /// NEES per dimension over many draws of `X = exp(c) X_hat exp(w)`, whose errors are those the covariance was made of;
+    /// stacked, and with the common motion apart.
+    fn drawn(view: &JointView) -> (f64, f64) {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let mut draw = |sigmas: [f64; 3]| -> Vector3 {
+            Vector3::from(
+                sigmas.map(|sigma| sigma * Distribution::<f64>::sample(&StandardNormal, &mut random)),
+            )
+        };
+        let (mut stacked, mut apart) = (0.0, 0.0);
+        for _ in 0..400 {
+            let common = Pose2::exp(draw([0.5, 0.5, 0.15]));
+            let truth = view.robots.iter().map(|(robot, pose)| {
+                (*robot, common.compose(pose).compose(&Pose2::exp(draw([0.05, 0.05, 0.2]))))
+            });
+            let truth: BTreeMap<RobotId, Pose2> = truth.collect();
+            let of = |deviation: Option<Deviation>| {
+                let (error, covariance) = deviation.unwrap();
+                nees(&error, &covariance).unwrap() / 9.0 / 400.0
+            };
+            stacked += of(view.deviation(&truth));
+            apart += of(view.deviation_apart(&truth));
+        }
+        (stacked, apart)
+    }
+
+    #[test]
+    fn a_team_that_is_as_good_as_it_says_is_found_so_with_the_common_motion_apart() {
+        // 3600 degrees of freedom: a standard deviation of 0.024.
+        let (stacked, apart) = drawn(&view());
+        assert!((apart - 1.0).abs() < 0.1, "{apart}");
+        assert!(stacked > 2.0, "{stacked}: stacked errors do not show it");
+    }
+
+    #[test]
+    fn a_team_that_says_half_its_variance_is_found_out() {
+        let mut view = view();
+        view.covariance *= 0.5;
+        let (_, apart) = drawn(&view);
+        assert!((apart - 2.0).abs() < 0.2, "{apart}");
+    }
+
+    #[test]
+    fn a_motion_of_the_whole_team_alone_is_the_error_of_each() {
+        let view = view();
+        let common = Vector3::new(0.4, -0.2, 0.1);
+        let truth =
+            view.robots.iter().map(|(robot, pose)| (*robot, Pose2::exp(common).compose(pose))).collect();
+        let (error, _) = view.deviation_apart(&truth).unwrap();
+        for robot in 0..3 {
+            assert!((error.fixed_rows::<3>(3 * robot) - common).amax() < 1e-9, "{error}");
+        }
+        let (stacked, _) = view.deviation(&truth).unwrap();
+        assert!((error - stacked).amax() < 1e-9);
+    }
+
+    #[test]
+    fn without_the_truth_of_a_robot_there_is_no_error() {
+        assert!(view().deviation_apart(&BTreeMap::new()).is_none());
+    }
+}

@@ -44,7 +44,7 @@ fn every_scenario_loads_and_simulates_under_its_own_name() {
         }
         names.push(scenario.name);
     }
-    for name in ["survey_three", "five_relative", "five_gps", "ten_gps", "five_landmarks"] {
+    for name in ["survey_three", "five_relative", "five_gps", "ten_gps", "five_landmarks", "five_hard"] {
         assert!(names.iter().any(|found| found == name), "{name} is missing");
     }
 }
