@@ -168,6 +168,10 @@ fn documented_defaults_are_the_defaults() {
     for key in ["prior.for_boot", "faults.seed"] {
         defaults.insert(key.to_owned(), Value::Integer(0));
     }
+    for key in ["filter.relinearize.block_s", "filter.relinearize.ahead_s"] {
+        defaults.insert(key.to_owned(), Value::Float(5.0));
+    }
+    defaults.insert("filter.relinearize.passes".to_owned(), Value::Integer(4));
     let mut full = flattened(&full());
     for (key, documented) in documented_keys() {
         full.remove(&key);
@@ -415,7 +419,7 @@ fn a_model_that_cannot_be_used_is_refused_with_both_files_and_the_key() {
 
 #[test]
 fn facts_are_linearized_together_over_times_that_make_sense() {
-    let of = |text: &str| read(&format!("{LEAST}{text}")).unwrap().node();
+    let of = |text: &str| read(&format!("{LEAST}{text}"))?.node();
     let fold = of("[filter]\nrelinearize = { block_s = 2.0, ahead_s = 4.0, passes = 3 }\n").unwrap().fold;
     let how = fold.relinearize.unwrap();
     assert_eq!((how.block_ns, how.ahead_ns, how.passes, how.cell_ns), (2_000_000_000, 4_000_000_000, 3, 0));

@@ -111,7 +111,12 @@ fn a_team_under_random_kills_stops_partitions_full_disks_and_loss_loses_nothing_
     let full = logged("journal.bin: File too large") + logged("journal.new: File too large");
     let lives = logged("agent started");
     assert!(full > 0, "{faults}");
-    assert_eq!(lives, 3 + full + usize::try_from(faults["kills"].as_u64().unwrap()).unwrap(), "{faults}");
+    // Every death is followed by another life. A full disk can keep the agent from saying why it ends, in a log that is longer
+    // than a journal just replaced.
+    let [kills, full_disks] =
+        ["kills", "full_disks"].map(|what| usize::try_from(faults[what].as_u64().unwrap()).unwrap());
+    let expected = 3 + kills + full..=3 + kills + full.max(full_disks);
+    assert!(expected.contains(&lives), "{lives} lives, {full} writes that failed: {faults}");
     // The script that was played is kept, and plays again.
     let script = std::fs::read_to_string(within.join("out/faults.toml")).unwrap();
     assert!(!script.contains("every_s") && script.matches("what = \"kill\"").count() > 0, "{script}");
