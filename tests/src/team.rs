@@ -143,6 +143,9 @@ impl Team {
     }
 
     /// Ends the run of a fleet that was fed by hand.
+    ///
+    /// # Panics
+    /// If a robot's odometry is not usable.
     pub fn finish(self, mut fleet: Fleet) -> TeamRun {
         let agreed = fleet.settle(self.end(), SETTLING_ROUNDS);
         let reckoned = self.configs.iter().map(|(robot, config)| {

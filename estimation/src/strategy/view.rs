@@ -205,12 +205,12 @@ mod tests {
             [(8.0, 0.0, 0.3), (8.5, 1.0, -2.0), (6.0, -2.0, 1.0)].map(|(x, y, yaw)| Pose2::new(x, y, yaw));
         let common = DMatrix::from_diagonal(&DVector::from_vec(vec![0.25, 0.25, 0.0225]));
         let mut covariance = DMatrix::zeros(9, 9);
-        for i in 0..3 {
+        for (i, pose) in poses.iter().enumerate() {
             for j in 0..3 {
                 covariance.view_mut((3 * i, 3 * j), (3, 3)).copy_from(&common);
             }
             let own = DMatrix::from_diagonal(&DVector::from_vec(vec![0.0025, 0.0025, 0.04]));
-            let turn = DMatrix::from_column_slice(3, 3, poses[i].adjoint().as_slice());
+            let turn = DMatrix::from_column_slice(3, 3, pose.adjoint().as_slice());
             let mut block = covariance.view_mut((3 * i, 3 * i), (3, 3));
             block += &turn * own * turn.transpose();
         }

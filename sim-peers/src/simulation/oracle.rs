@@ -85,13 +85,15 @@ fn at_once(joint: &Joint, whole: &Joint) -> Result<(), String> {
         let robot = expected.robot;
         let Some(member) = joint.member(robot) else { return Err(format!("robot {robot} is not placed")) };
         let apart = member.correction.between(&expected.correction).log().amax();
-        if !(apart <= TOLERANCE * (1.0 + expected.correction.position().norm())) {
+        let near = apart <= TOLERANCE * (1.0 + expected.correction.position().norm());
+        if !near {
             return Err(format!("robot {robot} is {apart:e} off what all facts at once make"));
         }
         for other in whole.members().map(|other| other.robot) {
             let blocks = block(joint, robot, other).zip(block(whole, robot, other));
             let apart = blocks.map_or(f64::NAN, |(a, b)| (a - b).amax());
-            if !(apart <= TOLERANCE * largest) {
+            let near = apart <= TOLERANCE * largest;
+            if !near {
                 return Err(format!("P of {robot} and {other} is {apart:e} off what all facts at once make"));
             }
         }

@@ -131,7 +131,9 @@ fn innovations(score: &mut Score, facts: &[(FactKey, Fact)], residuals: &BTreeMa
         .into_values()
         .map(|mut stream| {
             let square = stream.iter().map(|value| value * value).sum::<f64>() / stream.len() as f64;
-            stream.iter_mut().for_each(|value| *value /= square.sqrt().max(f64::MIN_POSITIVE));
+            for value in &mut stream {
+                *value /= square.sqrt().max(f64::MIN_POSITIVE);
+            }
             stream
         })
         .collect();
