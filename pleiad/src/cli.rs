@@ -1,6 +1,7 @@
 //! The command line, as clap sees it.
 
 mod calibrate;
+mod evaluate;
 mod slam;
 mod survey;
 mod values;
@@ -13,9 +14,10 @@ use pleiad_estimation::strategy::StrategyKind;
 use pleiad_sim_peers::scenario::ManoeuvreKind;
 
 pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
+pub use evaluate::{EvaluateArgs, VariantArg, VariantFilter};
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
-pub use values::{AbsoluteArg, LandmarksArg, RelinearizeArg, VariantArg, VariantFilter};
+pub use values::{AbsoluteArg, LandmarksArg, RelinearizeArg};
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
 #[derive(Debug, Parser)]
@@ -296,34 +298,6 @@ pub struct ConcealedArgs {
     #[arg(long, requires = "out")]
     pub resume: bool,
     /// Folder for the sealed answers, the results, summary.json and concealed.md; a new one under runs/ if absent.
-    #[arg(long)]
-    pub out: Option<PathBuf>,
-    /// One JSON object on stdout.
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[derive(Debug, Args)]
-pub struct EvaluateArgs {
-    /// The scenario; docs/scenario.md lists its keys.
-    pub scenario: PathBuf,
-    /// How many runs, each a world of its own.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(2..=100_000))]
-    pub seeds: u64,
-    /// The first seed; the scenario's own if absent.
-    #[arg(long)]
-    pub seed: Option<u64>,
-    /// Length of a run in simulated seconds; the scenario's own if absent.
-    #[arg(long)]
-    pub seconds: Option<f64>,
-    /// Filters, all on the same facts: additive, invariant, iterated:N (each measurement in N passes), or
-    /// BLOCK_S:AHEAD_S:PASSES (facts linearized together). What is said of errors is said relative to the first.
-    #[arg(long, value_delimiter = ',', default_value = "additive,invariant,iterated:4,5:5:4")]
-    pub variants: Vec<VariantArg>,
-    /// How many times of a run it is judged at, equally far apart.
-    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(2..=1000))]
-    pub times: u32,
-    /// Folder for the report and the numbers; a new one under runs/ if absent.
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// One JSON object on stdout.

@@ -15,6 +15,7 @@ fn all(seeds: std::ops::Range<u64>, options: &Options) -> Vec<Outcome> {
                 (false, false) => "",
             };
             let most = options.most_items.map_or_else(String::new, |items| format!(" --most-items {items}"));
+            let most = if options.relinearize { format!("{most} --relinearize") } else { most };
             panic!(
                 "seed {seed}: {violation}\nreplay: cargo run -p pleiad-tests --features planted \
                  --example schedules -- --seeds {seed}..{}{kind}{most}",
@@ -42,6 +43,13 @@ fn a_limit_on_items_in_memory_holds_and_every_invariant_with_it() {
     let (free, bounded) = (most(all(0..100, &free)), most(all(0..100, &bounded)));
     // Every event was checked against the bound that a team of this size cannot exceed.
     assert!(bounded < 500 && free > 700, "{bounded} {free}");
+}
+
+#[test]
+fn facts_linearized_together_are_those_of_one_fold_after_evictions_and_crashes() {
+    let outcomes = all(0..60, &Options { evictions: true, relinearize: true, ..Options::default() });
+    let total = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
+    assert!(total(|outcome| outcome.deaths) > 30 && total(|outcome| outcome.cuts) > 1000);
 }
 
 /// Seeds that have found a mistake in the rules, in the node or in the harness; `docs/ledger.md` says which.

@@ -49,40 +49,6 @@ impl FromStr for RelinearizeArg {
     }
 }
 
-/// A filter to be judged, as it was asked for.
-#[derive(Clone, Debug, PartialEq)]
-pub struct VariantArg {
-    pub name: String,
-    pub filter: VariantFilter,
-}
-
-/// What a variant does with the facts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum VariantFilter {
-    Additive,
-    Invariant,
-    /// Each measurement in so many passes.
-    Iterated(u32),
-    Relinearized(RelinearizeSection),
-}
-
-impl FromStr for VariantArg {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let filter = match text.split_once(':') {
-            None if text == "additive" => Some(VariantFilter::Additive),
-            None if text == "invariant" => Some(VariantFilter::Invariant),
-            Some(("iterated", passes)) => passes.parse().ok().map(VariantFilter::Iterated),
-            _ => text.parse().ok().map(|RelinearizeArg(how)| VariantFilter::Relinearized(how)),
-        };
-        let filter = filter.ok_or_else(|| {
-            format!("found {text:?}, expected additive, invariant, iterated:N, or BLOCK_S:AHEAD_S:PASSES as in 5:5:4")
-        });
-        Ok(Self { name: text.to_owned(), filter: filter? })
-    }
-}
-
 /// `ROBOT@HZ:SIGMA_M`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AbsoluteArg {
