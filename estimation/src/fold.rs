@@ -7,7 +7,7 @@ pub(crate) use window::fold_blocks;
 
 use crate::fact::{Boot, EntryId, Fingerprint, Noise, NominalState, Quantity};
 use crate::geometry::{Matrix3, Vector2, Vector3};
-use crate::joint::{ErrorForm, Joint, Participant, Update};
+use crate::joint::{ErrorForm, Joint, ParameterKind, Participant, Update, clock_influence};
 use crate::measurement::{self, Linearization, Unusable};
 use crate::{BootIndex, Pose2, RobotId, Sequence, Timestamp};
 
@@ -224,17 +224,79 @@ fn fold_observation(
         return Ok(Residual::without_measurement(Outcome::Placed));
     }
     let taken = taken(joint, key, quantity, observer, other)?;
-    let mut poses = Vec::with_capacity(2);
     for (index, state) in &taken {
         joint.propagate(*index, state);
-        poses.push(joint.part(*index).correction.compose(&state.nominal));
     }
+    let (poses, influences) = seen_poses(joint, key.time, quantity, &taken);
     let at = linearize(quantity, &poses)?;
-    let sides = taken.iter().zip(signs(quantity));
-    let mut participants: Vec<Participant> = sides
+    let mut participants = participants(quantity, &taken, &influences, &at);
+    update(joint, config, &at, &noise, &mut participants)
+}
+
+/// What besides a robot's own error moves its pose as a measurement sees it: the block, which pose of those in the order of
+/// [`taken`], and the derivative of that pose's error.
+type Influence = (usize, usize, Matrix3);
+
+/// The poses of those who take part as the measurement sees them, in the order of [`taken`]: of the observer the frame it sees
+/// from, and of the robot that was seen the pose at the observer's time, whose clock may differ.
+fn seen_poses(
+    joint: &Joint,
+    time: Timestamp,
+    quantity: &Quantity,
+    taken: &[(usize, NominalState)],
+) -> (Vec<Pose2>, Vec<Influence>) {
+    let own = |(index, state): &(usize, NominalState)| joint.part(*index).correction.compose(&state.nominal);
+    let mut poses: Vec<Pose2> = taken.iter().map(own).collect();
+    let mut influences = Vec::new();
+    if matches!(quantity, Quantity::Absolute(_)) {
+        return (poses, influences);
+    }
+    let parameters = |robot, kind| {
+        let index = joint.parameter_index(robot, kind)?;
+        joint.parameters_at(index).map(|of| (index, of))
+    };
+    let observer = joint.part(taken[0].0).robot;
+    if let Some((index, mount)) = parameters(observer, ParameterKind::Mount) {
+        let frame = Pose2::new(mount.value.x, mount.value.y, mount.value.z);
+        poses[0] = poses[0].compose(&frame);
+        let turned = Pose2::new(0.0, 0.0, -frame.yaw_rad()).adjoint();
+        influences.push((index, 0, poses[0].adjoint() * turned));
+    }
+    let Some((index, NominalState { sensitivity: Some(sensitivity), .. })) = taken.get(1) else {
+        return (poses, influences);
+    };
+    let clocks = [(joint.part(*index).robot, 1.0), (observer, -1.0)].map(|(robot, sign)| {
+        parameters(robot, ParameterKind::Clock).map(|(index, clock)| (index, clock, sign))
+    });
+    let late_s = clocks.iter().flatten().fold(0.0, |sum, (_, clock, sign)| {
+        sum + sign * (clock.value.x + clock.value.y * time.seconds_since(clock.since))
+    });
+    if late_s != 0.0 {
+        poses[1] = poses[1].compose(&Pose2::exp(sensitivity.twist * late_s));
+    }
+    for (index, clock, sign) in clocks.into_iter().flatten() {
+        influences.push((index, 1, clock_influence(&poses[1], sensitivity, clock, time) * sign));
+    }
+    (poses, influences)
+}
+
+/// The blocks that the prediction depends on, and how.
+fn participants(
+    quantity: &Quantity,
+    taken: &[(usize, NominalState)],
+    influences: &[Influence],
+    at: &Linearization,
+) -> Vec<Participant> {
+    let signs = signs(quantity);
+    let robots = taken.iter().zip(signs);
+    let mut participants: Vec<Participant> = robots
         .map(|((index, _), sign)| Participant { index: *index, jacobian: at.jacobian * *sign })
         .collect();
-    update(joint, config, &at, &noise, &mut participants)
+    participants.extend(influences.iter().map(|(index, which, by)| Participant {
+        index: *index,
+        jacobian: at.jacobian * *by * signs[*which],
+    }));
+    participants
 }
 
 /// The noise, if it fits what was measured.

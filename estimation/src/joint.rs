@@ -1,14 +1,18 @@
 //! The joint state of the team: a correction per robot and one covariance over all of them.
 
+mod block;
 mod covariance;
+mod view;
 
+pub use block::{Block, MappedLandmark, Member, ParameterKind, Parameters};
 pub use covariance::JointCovariance;
 pub(crate) use covariance::Prepared;
+pub(crate) use view::{RobotView, clock_influence};
 
-use crate::fact::{Boot, Continuation, NominalState};
+use crate::fact::{Boot, Calibration, Continuation, NominalState};
 use crate::geometry::{Matrix3, Vector3};
 use crate::symmetric::Symmetric3;
-use crate::{BootIndex, Pose2, RobotId};
+use crate::{BootIndex, LandmarkId, Pose2, RobotId, Timestamp};
 
 /// In which coordinates the error of a pose is Gaussian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,48 +25,18 @@ pub enum ErrorForm {
     Additive,
 }
 
-/// One robot's part of the joint state.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Member {
-    /// Who.
-    pub robot: RobotId,
-    /// On the trajectory of which boot.
-    pub boot: BootIndex,
-    /// `G`: the estimate at any time is `G N(t)`.
-    pub correction: Pose2,
-    /// The robot's nominal pose at its last event: there the additive form is linearized.
-    pub nominal: Pose2,
-    /// The noise sum already folded into the covariance.
-    pub folded_noise: Symmetric3,
-    placed: bool,
-}
-
-impl Member {
-    /// A robot's part from its numbers, for [`Joint::from_parts`].
-    pub fn new(
-        robot: RobotId,
-        boot: BootIndex,
-        correction: Pose2,
-        nominal: Pose2,
-        folded_noise: Symmetric3,
-    ) -> Self {
-        Self { robot, boot, correction, nominal, folded_noise, placed: true }
-    }
-}
-
 /// A joint taken apart, to be kept or sent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointParts {
-    /// The robots in the order of their rows, and whether they have a place in the map.
-    pub members: Vec<(Member, bool)>,
+    /// What the rows stand for, three by three, and, of robots, whether they have a place in the map.
+    pub blocks: Vec<(Block, bool)>,
     /// Packed lower triangle of the covariance, row after row.
     pub lower: Vec<f64>,
     /// How many measurements went into it.
     pub updates: u64,
 }
 
-/// A robot taking part in an update: its index and the derivative of the prediction with respect to its
-/// invariant error.
+/// A block taking part in an update: its index and the derivative of the prediction with respect to its error.
 pub(crate) struct Participant {
     pub index: usize,
     pub jacobian: Matrix3,
@@ -91,7 +65,7 @@ pub enum Update {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     form: ErrorForm,
-    members: Vec<Member>,
+    blocks: Vec<Block>,
     covariance: JointCovariance,
     updates: u64,
 }
@@ -99,7 +73,7 @@ pub struct Joint {
 impl Joint {
     /// No robot yet.
     pub fn new(form: ErrorForm) -> Self {
-        Self { form, members: Vec::new(), covariance: JointCovariance::default(), updates: 0 }
+        Self { form, blocks: Vec::new(), covariance: JointCovariance::default(), updates: 0 }
     }
 
     /// In which coordinates the error is Gaussian.
@@ -112,51 +86,89 @@ impl Joint {
         self.updates
     }
 
+    /// What the rows of the covariance stand for, three by three.
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
     /// The robots that have a place in the map, in the order of their rows in the covariance.
     pub fn members(&self) -> impl Iterator<Item = &Member> {
-        self.members.iter().filter(|member| member.placed)
+        self.blocks.iter().filter_map(Block::placed)
     }
 
     /// A robot that has a place in the map.
     pub fn member(&self, robot: RobotId) -> Option<&Member> {
-        self.index(robot).map(|index| &self.members[index])
+        self.members().find(|member| member.robot == robot)
     }
 
-    /// The covariance over all robots, in the coordinates of the error form; rows in the order in which
+    /// The covariance over all blocks, in the coordinates of the error form; rows in the order in which
     /// the robots were first placed. Rows of a robot without a place are zero.
     pub fn covariance(&self) -> &JointCovariance {
         &self.covariance
     }
 
-    /// Row block of a robot in [`Joint::covariance`].
+    /// Block of a robot in [`Joint::covariance`].
     pub fn index(&self, robot: RobotId) -> Option<usize> {
-        self.members.iter().position(|member| member.robot == robot && member.placed)
+        self.blocks.iter().position(|block| block.placed().is_some_and(|member| member.robot == robot))
+    }
+
+    /// Block of a robot's parameters, if they are estimated.
+    pub fn parameter_index(&self, robot: RobotId, kind: ParameterKind) -> Option<usize> {
+        let is = |of: &Parameters| of.robot == robot && of.kind == kind;
+        self.blocks.iter().position(|block| matches!(block, Block::Parameters(of) if is(of)))
+    }
+
+    /// The parameters in a block.
+    pub(crate) fn parameters_at(&self, index: usize) -> Option<&Parameters> {
+        match &self.blocks[index] {
+            Block::Parameters(of) => Some(of),
+            _ => None,
+        }
+    }
+
+    /// Parameters of a robot, if they are estimated, and their covariance.
+    pub fn parameters(&self, robot: RobotId, kind: ParameterKind) -> Option<(&Parameters, Matrix3)> {
+        let index = self.parameter_index(robot, kind)?;
+        Some((self.parameters_at(index)?, self.covariance.block(index, index)))
+    }
+
+    /// Block of a landmark of the team's map.
+    pub fn landmark_index(&self, landmark: LandmarkId) -> Option<usize> {
+        let is = |mapped: &MappedLandmark| mapped.landmark == landmark;
+        self.blocks.iter().position(|block| matches!(block, Block::Landmark(mapped) if is(mapped)))
     }
 
     /// All there is to it, robots without a place included: from the parts a joint can be made again.
     pub fn parts(&self) -> JointParts {
-        let members = self.members.iter().map(|member| (*member, member.placed));
-        JointParts {
-            members: members.collect(),
-            lower: self.covariance.lower().to_vec(),
-            updates: self.updates,
-        }
+        let blocks = self.blocks.iter().map(|block| (*block, block.placed().is_some()));
+        JointParts { blocks: blocks.collect(), lower: self.covariance.lower().to_vec(), updates: self.updates }
     }
 
-    /// The joint of these parts; `None` if the covariance does not have a row for every member.
+    /// The joint of these parts; `None` if the covariance does not have rows for every block.
     pub fn from_parts(form: ErrorForm, parts: JointParts) -> Option<Self> {
-        let covariance = JointCovariance::from_lower(3 * parts.members.len(), parts.lower)?;
-        let members = parts.members.into_iter().map(|(member, placed)| Member { placed, ..member });
-        Some(Self { form, members: members.collect(), covariance, updates: parts.updates })
+        let covariance = JointCovariance::from_lower(3 * parts.blocks.len(), parts.lower)?;
+        let blocks = parts.blocks.into_iter().map(|(block, placed)| match block {
+            Block::Robot(member) => Block::Robot(Member { placed, ..member }),
+            other => other,
+        });
+        Some(Self { form, blocks: blocks.collect(), covariance, updates: parts.updates })
     }
 
-    /// Estimate and covariance of one robot at `state` of its nominal trajectory. The covariance is of
+    /// Estimate and covariance of one robot at `state` of its nominal trajectory, when its clock shows `time`. The covariance is of
     /// the additive error (position in the map, yaw): what is published.
-    pub fn estimate(&self, robot: RobotId, state: &NominalState) -> Option<(Pose2, Symmetric3)> {
-        let index = self.index(robot)?;
-        let member = &self.members[index];
-        let block = self.covariance.block(index, index);
-        Some(extrapolate(self.form, &member.correction, &member.nominal, member.folded_noise, &block, state))
+    pub fn estimate(
+        &self,
+        robot: RobotId,
+        time: Timestamp,
+        state: &NominalState,
+    ) -> Option<(Pose2, Symmetric3)> {
+        Some(self.view(robot)?.estimate(time, state))
+    }
+
+    /// The correction of one robot that holds at `state` of its nominal trajectory, when its clock shows `time`. It is that of its
+    /// last event, unless its odometry or clock is calibrated.
+    pub fn correction_at(&self, robot: RobotId, time: Timestamp, state: &NominalState) -> Option<Pose2> {
+        Some(self.view(robot)?.correction_at(time, state))
     }
 
     /// Places a robot: `G = z N^-1`, its block from the noise of `z` in the body frame, no cross terms.
@@ -168,22 +180,16 @@ impl Joint {
         noise: &Matrix3,
         at: &NominalState,
     ) {
-        let member = Member {
-            robot,
-            boot,
-            correction: z.compose(&at.nominal.inverse()),
-            nominal: at.nominal,
-            folded_noise: at.noise_sum,
-            placed: true,
-        };
-        let index = if let Some(index) = self.members.iter().position(|known| known.robot == robot) {
-            self.members[index] = member;
+        let correction = z.compose(&at.nominal.inverse());
+        let mut member = Member::new(robot, boot, correction, at.nominal, at.noise_sum);
+        member.folded_motion = at.sensitivity.map_or_else(Matrix3::zeros, |sensitivity| sensitivity.motion);
+        let known = |block: &Block| matches!(block, Block::Robot(known) if known.robot == robot);
+        let index = if let Some(index) = self.blocks.iter().position(known) {
+            self.blocks[index] = Block::Robot(member);
             self.covariance.clear(index);
             index
         } else {
-            self.members.push(member);
-            self.covariance.grow();
-            self.members.len() - 1
+            self.add(Block::Robot(member))
         };
         let adjoint = z.adjoint();
         let mut block = adjoint * noise * adjoint.transpose();
@@ -194,16 +200,59 @@ impl Joint {
         self.covariance.set_diagonal(index, Symmetric3::from_lower(&block));
     }
 
+    fn add(&mut self, block: Block) -> usize {
+        let free = self.blocks.iter().position(|block| *block == Block::Free);
+        if let Some(index) = free {
+            self.blocks[index] = block;
+            return index;
+        }
+        self.blocks.push(block);
+        self.covariance.grow();
+        self.blocks.len() - 1
+    }
+
     /// A boot begins: a continued one carries the robot's block on, a lost one ends it.
     pub(crate) fn boot(&mut self, robot: RobotId, index: BootIndex, boot: &Boot) {
-        let Some(row) = self.index(robot) else { return };
-        match &boot.continuation {
-            Some(continuation) if continuation.previous == self.members[row].boot => {
+        let row = self.index(robot);
+        let carried_on = match (&boot.continuation, row) {
+            (Some(continuation), Some(row)) if continuation.previous == self.part(row).boot => {
                 self.carry_on(row, index, boot, continuation);
+                true
             }
             _ => {
-                self.members[row].placed = false;
-                self.covariance.clear(row);
+                if let Some(row) = row {
+                    self.part_mut(row).placed = false;
+                    self.covariance.clear(row);
+                }
+                false
+            }
+        };
+        if self.form == ErrorForm::Invariant {
+            self.calibrate(robot, boot.time, boot.calibration.as_ref(), carried_on);
+        }
+    }
+
+    /// What is uncertain of a robot from a boot on. What was estimated before stays if the boot is carried on.
+    fn calibrate(
+        &mut self,
+        robot: RobotId,
+        since: Timestamp,
+        calibration: Option<&Calibration>,
+        carried_on: bool,
+    ) {
+        let wanted: Vec<_> = calibration.into_iter().flat_map(block::uncertain).collect();
+        for index in 0..self.blocks.len() {
+            let Block::Parameters(of) = &self.blocks[index] else { continue };
+            if of.robot == robot && !(carried_on && wanted.iter().any(|(kind, _)| *kind == of.kind)) {
+                self.blocks[index] = Block::Free;
+                self.covariance.clear(index);
+            }
+        }
+        for (kind, [a, b, c]) in wanted {
+            if self.parameter_index(robot, kind).is_none() {
+                let value = Vector3::zeros();
+                let index = self.add(Block::Parameters(Parameters { robot, kind, value, since }));
+                self.covariance.set_diagonal(index, Symmetric3::diagonal(a * a, b * b, c * c));
             }
         }
     }
@@ -212,18 +261,22 @@ impl Joint {
     /// frame; then the unseen motion of the gap. Cross terms stay (`docs/theory.md`, boots).
     fn carry_on(&mut self, row: usize, index: BootIndex, boot: &Boot, continuation: &Continuation) {
         let s = boot.nominal.compose(&continuation.last.nominal.inverse());
-        let member = &mut self.members[row];
+        let form = self.form;
+        let member = self.part_mut(row);
         let unfolded = unfolded_noise(continuation.last.noise_sum, member.folded_noise);
         // The additive form is linearized at the last event; that pose is the same in the new frame.
         member.nominal = s.compose(&member.nominal);
         member.correction = member.correction.compose(&s.inverse());
         member.folded_noise = unfolded.congruence(&s.adjoint()).scaled(-1.0);
+        member.folded_motion = continuation.last.sensitivity.map_or_else(Matrix3::zeros, |last| {
+            s.adjoint() * (member.folded_motion - last.motion)
+        });
         member.boot = index;
-        if self.form == ErrorForm::Additive {
+        if form == ErrorForm::Additive {
             // Its coordinates do not stay put, so that what is carried is folded here, with the gap.
             let gap = continuation.gap.congruence(&boot.nominal.adjoint());
-            self.propagate(row, &NominalState { nominal: boot.nominal, noise_sum: gap });
-            self.members[row].folded_noise = Symmetric3::zero();
+            self.propagate(row, &NominalState::new(boot.nominal, gap));
+            self.part_mut(row).folded_noise = Symmetric3::zero();
         } else {
             // The gap is motion in the body frame at the pose after it. What is carried is folded with the
             // next event, as it would have been without the boot.
@@ -233,9 +286,11 @@ impl Joint {
         }
     }
 
-    /// Folds the process noise a robot has accumulated since its last event.
+    /// Folds the process noise a robot has accumulated since its last event, and what the parameters of its odometry move
+    /// it by.
     pub(crate) fn propagate(&mut self, index: usize, state: &NominalState) {
-        let member = &mut self.members[index];
+        self.move_by_parameters(index, state);
+        let member = self.part(index);
         let mut added = state.noise_sum.minus(member.folded_noise).congruence(&member.correction.adjoint());
         if self.form == ErrorForm::Additive {
             let pose = member.correction.compose(&state.nominal);
@@ -243,19 +298,52 @@ impl Joint {
             self.covariance.transform(index, &additive_transition(&last, &pose));
             added = added.congruence(&pose.additive_from_invariant());
         }
+        let member = self.part_mut(index);
         member.folded_noise = state.noise_sum;
         member.nominal = state.nominal;
         self.covariance.add_diagonal(index, added);
     }
 
-    /// The part of the robot in a row.
+    /// `xi <- xi + A p` with `A = Ad_G (W(t) - W(last))`: what the odometry's parameters did since the last event.
+    /// Gives the block of the parameters and `A`. Once done, there is nothing more to move for the same state.
+    pub(crate) fn move_by_parameters(
+        &mut self,
+        index: usize,
+        state: &NominalState,
+    ) -> Option<(usize, Matrix3)> {
+        let sensitivity = state.sensitivity.as_ref()?;
+        let member = *self.part(index);
+        self.part_mut(index).folded_motion = sensitivity.motion;
+        let row = self.parameter_index(member.robot, ParameterKind::Motion)?;
+        let value = self.parameters_at(row)?.value;
+        let by = member.correction.adjoint() * (sensitivity.motion - member.folded_motion);
+        self.part_mut(index).correction = Pose2::exp(by * value).compose(&member.correction);
+        self.covariance.couple(index, row, &by);
+        Some((row, by))
+    }
+
+    /// The robot in a block that is known to hold one.
+    ///
+    /// Indices come from [`Joint::index`] and from blocks added as robots, so that there always is one.
+    #[allow(clippy::panic, reason = "an index of a robot's block is only ever taken from a robot's block")]
     pub(crate) fn part(&self, index: usize) -> &Member {
-        &self.members[index]
+        match &self.blocks[index] {
+            Block::Robot(member) => member,
+            other => panic!("block {index} is no robot: {other:?}"),
+        }
+    }
+
+    #[allow(clippy::panic, reason = "an index of a robot's block is only ever taken from a robot's block")]
+    fn part_mut(&mut self, index: usize) -> &mut Member {
+        match &mut self.blocks[index] {
+            Block::Robot(member) => member,
+            other => panic!("block {index} is no robot: {other:?}"),
+        }
     }
 
     /// Measures a robot's error from another correction. For windows of the fold.
     pub(crate) fn set_correction(&mut self, index: usize, correction: Pose2) {
-        self.members[index].correction = correction;
+        self.part_mut(index).correction = correction;
     }
 
     /// Takes an update from the covariance, and leaves the corrections. For windows of the fold.
@@ -283,7 +371,7 @@ impl Joint {
     ) -> Update {
         if self.form == ErrorForm::Additive {
             for participant in participants.iter_mut() {
-                let member = &self.members[participant.index];
+                let member = self.part(participant.index);
                 let pose = member.correction.compose(&member.nominal);
                 participant.jacobian *= pose.invariant_from_additive();
             }
@@ -297,39 +385,34 @@ impl Joint {
         }
         self.updates += 1;
         self.covariance.downdate(&prepared);
-        for (index, member) in self.members.iter_mut().enumerate().filter(|(_, member)| member.placed) {
-            let delta = prepared.correction(index);
-            match self.form {
-                ErrorForm::Invariant => {
-                    member.correction = Pose2::exp(delta).compose(&member.correction);
-                }
-                ErrorForm::Additive => {
-                    let pose = member.correction.compose(&member.nominal);
-                    let moved =
-                        Pose2::new(pose.x_m() + delta.x, pose.y_m() + delta.y, pose.yaw_rad() + delta.z);
-                    member.correction = moved.compose(&member.nominal.inverse());
-                }
-            }
+        for index in 0..self.blocks.len() {
+            self.correct(index, prepared.correction(index));
         }
         Update::Used { nis }
     }
 
+    /// Takes an error found into what it is the error of.
+    pub(crate) fn correct(&mut self, index: usize, delta: Vector3) {
+        match (&mut self.blocks[index], self.form) {
+            (Block::Robot(member), ErrorForm::Invariant) if member.placed => {
+                member.correction = Pose2::exp(delta).compose(&member.correction);
+            }
+            (Block::Robot(member), ErrorForm::Additive) if member.placed => {
+                let pose = member.correction.compose(&member.nominal);
+                let moved =
+                    Pose2::new(pose.x_m() + delta.x, pose.y_m() + delta.y, pose.yaw_rad() + delta.z);
+                member.correction = moved.compose(&member.nominal.inverse());
+            }
+            (Block::Parameters(of), _) => of.value += delta,
+            (Block::Landmark(mapped), _) => mapped.pose = Pose2::exp(delta).compose(&mapped.pose),
+            (Block::Robot(_) | Block::Free, _) => {}
+        }
+    }
+
     /// The bits of the estimate, for comparing two of them: robots, corrections, covariance.
     pub(crate) fn words(&self) -> impl Iterator<Item = u64> + '_ {
-        let members = self.members.iter().flat_map(|member| {
-            let g = &member.correction;
-            [
-                u64::from(member.robot.0),
-                u64::from(member.boot.0),
-                u64::from(member.placed),
-                g.x_m().to_bits(),
-                g.y_m().to_bits(),
-                g.yaw_rad().to_bits(),
-            ]
-            .into_iter()
-            .chain(member.folded_noise.0.into_iter().map(f64::to_bits))
-        });
-        members.chain(self.covariance.lower().iter().map(|entry| entry.to_bits()))
+        let blocks = self.blocks.iter().flat_map(Block::words);
+        blocks.chain(self.covariance.lower().iter().map(|entry| entry.to_bits()))
     }
 }
 
@@ -339,30 +422,6 @@ fn unfolded_noise(last: Symmetric3, folded: Symmetric3) -> Symmetric3 {
     let unfolded = last.minus(folded);
     let before = [0, 2, 5].into_iter().any(|entry| unfolded.0[entry] < -1e-9 * last.0[entry]);
     if before { Symmetric3::zero() } else { unfolded }
-}
-
-/// A robot's estimate at `state` of its nominal trajectory, and the covariance of position and yaw, from
-/// what the joint holds of it as of its last event.
-pub(crate) fn extrapolate(
-    form: ErrorForm,
-    correction: &Pose2,
-    last_nominal: &Pose2,
-    folded_noise: Symmetric3,
-    block: &Matrix3,
-    state: &NominalState,
-) -> (Pose2, Symmetric3) {
-    let pose = correction.compose(&state.nominal);
-    let grown = state.noise_sum.minus(folded_noise).congruence(&correction.adjoint());
-    let published = pose.additive_from_invariant();
-    let block = Symmetric3::from_lower(block);
-    let covariance = match form {
-        ErrorForm::Invariant => block.plus(grown).congruence(&published),
-        ErrorForm::Additive => {
-            let phi = additive_transition(&correction.compose(last_nominal), &pose);
-            block.congruence(&phi).plus(grown.congruence(&published))
-        }
-    };
-    (pose, covariance)
 }
 
 /// `[I, J (p_new - p_last)]`: the textbook transition from a robot's last event to `pose`.

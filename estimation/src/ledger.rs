@@ -32,7 +32,7 @@ pub use views::{Term, Views};
 
 use crate::fact::{
     Answer, Body, Entry, EntryId, Fingerprint, LogId, Noise, NoiseRef, NominalState, Observation, Quantity,
-    VoidReason,
+    VoidReason, read_extension,
 };
 use crate::fold::{Fact, FactKey, FoldConfig, Relinearization, Residual, fold, fold_blocks};
 use crate::joint::Joint;
@@ -166,7 +166,8 @@ impl Ledger {
     }
 
     /// Takes an entry, from whomever it came. The estimate follows at the next [`Ledger::settle`].
-    pub fn insert(&mut self, entry: Entry) -> Insertion {
+    pub fn insert(&mut self, mut entry: Entry) -> Insertion {
+        read_extension(&mut entry);
         let id = entry.id;
         if let Some(refusal) = self.outside(id) {
             // What is over and forgotten comes again and again; it was accounted for.

@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use crate::fact::NominalState;
+use crate::fact::{NominalState, Sensitivity};
+use crate::geometry::{Matrix3, Vector3};
 use crate::motion::Step;
 use crate::symmetric::Symmetric3;
 use crate::{Pose2, Timestamp};
@@ -11,6 +12,8 @@ use crate::{Pose2, Timestamp};
 #[derive(Clone, Debug)]
 pub struct NominalTrajectory {
     ticks: VecDeque<Tick>,
+    /// Derivative of each tick's pose by what is uncertain of the odometry; empty if nothing is calibrated.
+    derivatives: VecDeque<Matrix3>,
     horizon: usize,
     start: Timestamp,
     distance_m: f64,
@@ -36,9 +39,10 @@ pub enum Outside {
 impl NominalTrajectory {
     /// Starts at `time` with `N = nominal` and `C = 0`, keeping the last `horizon` ticks (at least two).
     pub fn new(time: Timestamp, nominal: Pose2, horizon: usize) -> Self {
-        let state = NominalState { nominal, noise_sum: Symmetric3::zero() };
+        let state = NominalState::new(nominal, Symmetric3::zero());
         Self {
             ticks: VecDeque::from([Tick { time, state }]),
+            derivatives: VecDeque::new(),
             horizon: horizon.max(2),
             start: time,
             distance_m: 0.0,
@@ -47,8 +51,16 @@ impl NominalTrajectory {
 
     /// Goes on from a state that was kept, with nothing before it.
     pub fn resume(time: Timestamp, state: NominalState, horizon: usize) -> Self {
-        let ticks = VecDeque::from([Tick { time, state }]);
-        Self { ticks, horizon: horizon.max(2), start: time, distance_m: 0.0 }
+        let mut trajectory = Self::new(time, state.nominal, horizon);
+        trajectory.ticks[0].state = state;
+        trajectory
+    }
+
+    /// Keeps, from its start, how the states depend on what is uncertain of the odometry.
+    #[must_use]
+    pub fn calibrated(mut self) -> Self {
+        self.derivatives = self.ticks.iter().map(|_| Matrix3::zeros()).collect();
+        self
     }
 
     /// Takes over a state that was computed before; earlier ones than the last are left out.
@@ -57,10 +69,17 @@ impl NominalTrajectory {
         if time > last {
             let moved = state.nominal.position() - before.nominal.position();
             self.distance_m += (moved.x * moved.x + moved.y * moved.y).sqrt();
-            self.ticks.push_back(Tick { time, state });
-            if self.ticks.len() > self.horizon {
-                self.ticks.pop_front();
-            }
+            // What was kept says nothing of it.
+            self.derivatives.clear();
+            self.push(Tick { time, state });
+        }
+    }
+
+    fn push(&mut self, tick: Tick) {
+        self.ticks.push_back(tick);
+        if self.ticks.len() > self.horizon {
+            self.ticks.pop_front();
+            self.derivatives.pop_front();
         }
     }
 
@@ -73,6 +92,7 @@ impl NominalTrajectory {
     pub fn forget_until(&mut self, time: Timestamp) {
         while self.ticks.len() > 2 && self.ticks[1].time <= time {
             self.ticks.pop_front();
+            self.derivatives.pop_front();
         }
     }
 
@@ -89,8 +109,21 @@ impl NominalTrajectory {
     /// The last odometry.
     pub fn end(&self) -> (Timestamp, NominalState) {
         // The deque is never empty: it is built with one tick and only the oldest of two or more is dropped.
-        let tick = self.ticks[self.ticks.len() - 1];
-        (tick.time, tick.state)
+        let last = self.ticks.len() - 1;
+        let Tick { time, state } = self.ticks[last];
+        let derivative = self.derivatives.get(last).copied();
+        let sensitivity = derivative.map(|motion| Sensitivity { motion, twist: self.twist(last.max(1)) });
+        (time, NominalState { sensitivity, ..state })
+    }
+
+    /// Velocity in the body frame from the tick before the one with this index to it.
+    fn twist(&self, next: usize) -> Vector3 {
+        match (self.ticks.get(next.wrapping_sub(1)), self.ticks.get(next)) {
+            (Some(last), Some(next)) => {
+                last.state.nominal.between(&next.state.nominal).log() / next.time.seconds_since(last.time)
+            }
+            _ => Vector3::zeros(),
+        }
     }
 
     /// `N <- N exp(u)`, `C <- C + Ad_N Q Ad_N^T` with the adjoint at the pose after the step
@@ -99,12 +132,18 @@ impl NominalTrajectory {
         let (_, last) = self.end();
         let nominal = last.nominal.compose(&Pose2::exp(step.motion));
         let added = step.covariance.congruence(&nominal.adjoint());
-        let state = NominalState { nominal, noise_sum: last.noise_sum.plus(added) };
-        self.distance_m += (step.motion.x * step.motion.x + step.motion.y * step.motion.y).sqrt();
-        self.ticks.push_back(Tick { time: step.to, state });
-        if self.ticks.len() > self.horizon {
-            self.ticks.pop_front();
+        let state = NominalState::new(nominal, last.noise_sum.plus(added));
+        if let Some(derivative) = self.derivatives.back() {
+            // At the middle of the step, where the mean of the adjoint over it is to second order.
+            let middle = last.nominal.compose(&Pose2::exp(step.motion * 0.5)).adjoint();
+            let (x, y, z) = (step.motion.x, step.motion.y, step.motion.z);
+            let seconds = step.to.seconds_since(step.from);
+            let columns = Matrix3::new(x, 0.0, 0.0, y, 0.0, 0.0, 0.0, z, -seconds);
+            let derivative = derivative + middle * columns;
+            self.derivatives.push_back(derivative);
         }
+        self.distance_m += (step.motion.x * step.motion.x + step.motion.y * step.motion.y).sqrt();
+        self.push(Tick { time: step.to, state });
     }
 
     /// The state at `time`: the pose interpolated on the group, the noise sum linearly.
@@ -118,7 +157,10 @@ impl NominalTrajectory {
         let after = self.ticks.partition_point(|tick| tick.time < time);
         let Some(next) = self.ticks.get(after) else { return Err(Outside::After) };
         if next.time == time {
-            return Ok(next.state);
+            let derivative = self.derivatives.get(after).copied();
+            let sensitivity =
+                derivative.map(|motion| Sensitivity { motion, twist: self.twist(after.max(1)) });
+            return Ok(NominalState { sensitivity, ..next.state });
         }
         if after == 0 {
             return Err(Outside::Forgotten);
@@ -128,14 +170,17 @@ impl NominalTrajectory {
         let motion = last.state.nominal.between(&next.state.nominal).log();
         let nominal = last.state.nominal.compose(&Pose2::exp(motion * share));
         let grown = next.state.noise_sum.minus(last.state.noise_sum).scaled(share);
-        Ok(NominalState { nominal, noise_sum: last.state.noise_sum.plus(grown) })
+        let sensitivity = self.derivatives.get(after).map(|next| {
+            let last = self.derivatives[after - 1];
+            Sensitivity { motion: last + (next - last) * share, twist: self.twist(after) }
+        });
+        Ok(NominalState { sensitivity, ..NominalState::new(nominal, last.state.noise_sum.plus(grown)) })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Matrix3, Vector3};
 
     fn arc(ticks: u32, speed: f64, rate: f64, covariance: Symmetric3) -> NominalTrajectory {
         let mut trajectory = NominalTrajectory::new(Timestamp(0), Pose2::new(1.0, 2.0, 0.5), 10_000);
@@ -207,5 +252,34 @@ mod tests {
             trajectory.extend(&step);
         }
         assert_eq!(trajectory.at(Timestamp(5_000)), Err(Outside::Forgotten));
+    }
+
+    #[test]
+    fn derivatives_are_those_of_other_odometry() {
+        // Independent route: the trajectory integrated again with each parameter changed a little.
+        let moved = |scale: f64, turn: f64, bias: f64| {
+            let mut trajectory =
+                NominalTrajectory::new(Timestamp(0), Pose2::new(1.0, 2.0, 0.5), 10_000).calibrated();
+            for k in 0..500_i64 {
+                let (from, to) = (Timestamp(k * 40_000_000), Timestamp((k + 1) * 40_000_000));
+                let rate = if k < 200 { 0.6 } else { -0.9 };
+                let motion =
+                    Vector3::new(0.5 * 0.04 * (1.0 + scale), 0.0, rate * 0.04 * (1.0 + turn) - bias * 0.04);
+                trajectory.extend(&Step { from, to, motion, covariance: Symmetric3::zero() });
+            }
+            trajectory.at(Timestamp(19_987_000_000)).unwrap()
+        };
+        let here = moved(0.0, 0.0, 0.0);
+        let derivative = here.sensitivity.unwrap().motion;
+        let small = 1e-5;
+        for (column, other) in
+            [moved(small, 0.0, 0.0), moved(0.0, small, 0.0), moved(0.0, 0.0, small)].iter().enumerate()
+        {
+            let found = other.nominal.compose(&here.nominal.inverse()).log() / small;
+            let stated = derivative.column(column);
+            assert!((found - stated).norm() < 2e-3 * found.norm(), "{column}: {found} {stated}");
+        }
+        let twist = here.sensitivity.unwrap().twist;
+        assert!((twist - Vector3::new(0.5, 0.0, -0.9)).norm() < 1e-9, "{twist}");
     }
 }

@@ -89,7 +89,7 @@ pub fn noise(rng: &mut impl Rng, dimension: u8) -> Noise {
 }
 
 fn state(rng: &mut impl Rng) -> NominalState {
-    NominalState { nominal: pose(rng), noise_sum: covariance(rng) }
+    NominalState::new(pose(rng), covariance(rng))
 }
 
 fn relative(rng: &mut impl Rng) -> (Relative, u8) {
@@ -182,8 +182,7 @@ pub fn entry(rng: &mut impl Rng) -> Entry {
                 time: time(rng),
                 last: state(rng),
                 gap: covariance(rng),
-            }),
-        }),
+            }), calibration: None }),
         1 => {
             let dimension = rng.random_range(1..=3);
             Body::Profile(Profile { index: rng.random(), noise: noise(rng, dimension) })

@@ -98,7 +98,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Record, ProtocolError> {
             for entry in &mut noise_sum.0 {
                 *entry = numbers.number()?;
             }
-            Record::Tick { boot, time, state: NominalState { nominal, noise_sum }, odom }
+            Record::Tick { boot, time, state: NominalState::new(nominal, noise_sum), odom }
         }
         CLOSED => Record::Closed(numbers.time()?),
         CHECKPOINT => Record::Checkpoint(Box::new(decode_checkpoint(numbers.0)?)),

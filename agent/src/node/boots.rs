@@ -37,7 +37,7 @@ impl Node {
             (None, Some(prior)) => prior.pose,
             (None, None) => Pose2::identity(),
         };
-        let odom = self.odom_of(&Boot { time, nonce: 0, configuration: 0, nominal, continuation });
+        let odom = self.odom_of(&Boot { time, nonce: 0, configuration: 0, nominal, continuation, calibration: None });
         self.membership.lost_disk |= self.segments.last().is_none() && index > BootIndex(0);
         self.lived = true;
         self.lived_boots.insert(index);
@@ -49,7 +49,7 @@ impl Node {
         self.keep_tick();
         let nonce = self.nonce.wrapping_add(u64::from(index.0));
         let configuration = self.ledger.configuration();
-        self.say(index, Body::Boot(Boot { time, nonce, configuration, nominal, continuation }));
+        self.say(index, Body::Boot(Boot { time, nonce, configuration, nominal, continuation, calibration: None }));
         self.say(index, Body::ClockMap(self.config.clock));
         for (profile, noise) in (0u16..).zip(self.config.sensors.profiles()) {
             if let Some(noise) = noise {

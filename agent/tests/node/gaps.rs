@@ -175,6 +175,6 @@ fn observation_of(node: &Node, robot: u32) -> EntryId {
 }
 
 fn standing() -> Answer {
-    let state = NominalState { nominal: Pose2::identity(), noise_sum: Symmetric3::zero() };
+    let state = NominalState::new(Pose2::identity(), Symmetric3::zero());
     Answer::State { boot: BootIndex(0), state }
 }

@@ -175,14 +175,13 @@ pub fn entry(id: EntryId, body: Body) -> Entry {
 /// The log of a robot that stands at the origin, was placed there at time 0, and saw others, `(when, whom)`,
 /// where robot 1 would be had it started at time 0.
 pub fn standing_log(robot: u32, fold: FoldConfig, saw: &[(f64, u32)]) -> Vec<Entry> {
-    let still = NominalState { nominal: Pose2::identity(), noise_sum: Symmetric3::zero() };
+    let still = NominalState::new(Pose2::identity(), Symmetric3::zero());
     let boot = Boot {
         time: seconds(0.0),
         nonce: 1,
         configuration: fold.hash(),
         nominal: Pose2::identity(),
-        continuation: None,
-    };
+        continuation: None, calibration: None };
     let noise = NoiseRef::Explicit(Noise::from_sigmas(&[0.1, 0.1, 0.05]));
     let observation = |time_s: f64, quantity| {
         Body::Observation(Observation { time: seconds(time_s), quantity, noise, observer: still })

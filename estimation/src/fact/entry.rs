@@ -1,6 +1,6 @@
 //! The entries of a log.
 
-use super::{Seal, Vote};
+use super::{Calibration, Seal, Sensitivity, Vote};
 use crate::sample::Relative;
 use crate::symmetric::Symmetric3;
 use crate::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timestamp};
@@ -45,7 +45,8 @@ pub struct Entry {
     pub id: EntryId,
     /// What was said.
     pub body: Body,
-    /// Room for later versions (twist at t, ...), kept and passed on verbatim, counted in the fingerprint.
+    /// What only some robots say ([`extension_of_state`](super::extension_of_state)), and room for later versions: kept and
+    /// passed on verbatim, counted in the fingerprint.
     pub extension: Vec<u8>,
 }
 
@@ -77,6 +78,15 @@ pub struct NominalState {
     /// `C(t) = sum Ad_N Q dt Ad_N^T`: process noise accumulated since the start of the boot, in the
     /// frame of the nominal trajectory, tangent order (x, y, yaw): m^2, m rad, rad^2.
     pub noise_sum: Symmetric3,
+    /// How it depends on what is calibrated; `None` if nothing is.
+    pub sensitivity: Option<Sensitivity>,
+}
+
+impl NominalState {
+    /// A state on which nothing that is calibrated has an influence.
+    pub fn new(nominal: Pose2, noise_sum: Symmetric3) -> Self {
+        Self { nominal, noise_sum, sensitivity: None }
+    }
 }
 
 /// A boot begins.
@@ -92,6 +102,8 @@ pub struct Boot {
     pub nominal: Pose2,
     /// The journal was intact, and the previous boot is carried on.
     pub continuation: Option<Continuation>,
+    /// What is uncertain about the robot besides its pose.
+    pub calibration: Option<Calibration>,
 }
 
 /// What carries a robot's block over from one boot to the next.

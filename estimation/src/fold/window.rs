@@ -12,7 +12,7 @@
 use crate::fact::NominalState;
 use crate::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, fold, linearize, taken};
 use crate::geometry::{Matrix3, Vector3};
-use crate::joint::{ErrorForm, Joint, Participant, Prepared};
+use crate::joint::{Block, ErrorForm, Joint, Participant, Prepared};
 use crate::measurement;
 use crate::{Pose2, Timestamp, fact::Quantity};
 
@@ -119,18 +119,26 @@ fn is_measurement(joint: &Joint, key: &FactKey, fact: &Fact) -> bool {
 
 /// A measurement of a stretch.
 struct Event<'a> {
+    time: Timestamp,
     quantity: &'a Quantity,
     noise: Matrix3,
     participants: Vec<(usize, NominalState)>,
 }
 
-/// Where the corrections of those who take part in each measurement are linearized.
-type Points = Vec<Vec<Pose2>>;
+/// Where it is linearized.
+struct Points {
+    /// The corrections of those who take part in each measurement.
+    events: Vec<Vec<Pose2>>,
+    /// Blocks of parameters, which stay what they are.
+    parameters: Vec<(usize, Vector3)>,
+}
 
 /// What the forward pass leaves of a measurement for the backward pass.
 struct Trace {
     /// Of each participant the correction at which it was linearized, and the mean of its error from there before the update.
     at: Vec<(Pose2, Vector3)>,
+    /// Which errors were moved by those of which parameters, and how, before everything else.
+    couplings: Vec<(usize, usize, Matrix3)>,
     /// Rows of the covariance before the update, of each participant.
     rows: Vec<[Vec<f64>; 3]>,
     /// The update, if there was one, with its participants.
@@ -148,18 +156,11 @@ fn fold_stretch(
     let events: Vec<Result<Event<'_>, SkipReason>> =
         facts.iter().map(|(key, fact)| event(joint, key, fact)).collect();
     let points = (1..passes).fold(None, |points, _| Some(smoothed(joint, config, &events, points.as_ref())));
-    let mut pass = Pass::new(joint.clone());
+    let mut pass = Pass::new(joint.clone(), points.as_ref());
     for (index, event) in events.iter().enumerate().take(count) {
+        let at = points.as_ref().map(|points| points.events[index].as_slice());
         let residual = match event {
-            Ok(event) => {
-                pass.take(
-                    config,
-                    event,
-                    points.as_ref().map(|points: &Points| points[index].as_slice()),
-                    false,
-                )
-                .0
-            }
+            Ok(event) => pass.take(config, event, at, false).0,
             Err(reason) => Residual::without_measurement(Outcome::Skipped(*reason)),
         };
         told(index, residual, &|| pass.clone().ended());
@@ -171,7 +172,7 @@ fn event<'a>(joint: &Joint, key: &FactKey, fact: &'a Fact) -> Result<Event<'a>, 
     let Fact::Observation { quantity, noise, observer, other } = fact else { return Err(SkipReason::Noise) };
     let noise = super::usable(quantity, noise.as_ref())?;
     let participants = taken(joint, key, quantity, observer, other.as_ref())?;
-    Ok(Event { quantity, noise: measurement::noise_matrix(&noise), participants })
+    Ok(Event { time: key.time, quantity, noise: measurement::noise_matrix(&noise), participants })
 }
 
 /// Where the participants of each measurement were, by all of the stretch: a forward and a backward pass.
@@ -181,33 +182,49 @@ fn smoothed(
     events: &[Result<Event<'_>, SkipReason>],
     points: Option<&Points>,
 ) -> Points {
-    let mut pass = Pass::new(joint.clone());
+    let mut pass = Pass::new(joint.clone(), points);
+    let begun = pass.clone();
     let traces = events.iter().enumerate().map(|(index, event)| {
-        let at = points.map(|points| points[index].as_slice());
+        let at = points.map(|points| points.events[index].as_slice());
         event.as_ref().ok().map(|event| pass.take(config, event, at, true).1)
     });
     let traces: Vec<Option<Trace>> = traces.collect();
     let mut adjoint = vec![0.0; joint.covariance().size()];
-    let mut points: Points = vec![Vec::new(); events.len()];
+    let along = |row: &[f64], adjoint: &[f64]| {
+        let mut sum = 0.0;
+        for (a, b) in row.iter().zip(adjoint) {
+            sum += a * b;
+        }
+        sum
+    };
+    let mut points = vec![Vec::new(); events.len()];
     for (trace, points) in traces.iter().zip(&mut points).rev() {
         let Some(trace) = trace else { continue };
         if let Some((prepared, participants)) = &trace.update {
             prepared.take_back(participants, &mut adjoint);
         }
         let moved = |((correction, mean), rows): (&(Pose2, Vector3), &[Vec<f64>; 3])| {
-            let along = |row: &Vec<f64>| {
-                let mut sum = 0.0;
-                for (a, b) in row.iter().zip(&adjoint) {
-                    sum += a * b;
-                }
-                sum
-            };
-            Pose2::exp(mean - Vector3::new(along(&rows[0]), along(&rows[1]), along(&rows[2])))
-                .compose(correction)
+            let moved = [0, 1, 2].map(|axis| along(&rows[axis], &adjoint));
+            Pose2::exp(mean - Vector3::from(moved)).compose(correction)
         };
         *points = trace.at.iter().zip(&trace.rows).map(moved).collect();
+        for (index, row, by) in trace.couplings.iter().rev() {
+            for column in 0..3 {
+                let mut sum = 0.0;
+                for axis in 0..3 {
+                    sum += by[(axis, column)] * adjoint[3 * index + axis];
+                }
+                adjoint[3 * row + column] += sum;
+            }
+        }
     }
-    points
+    let parameters = joint.blocks().iter().enumerate().filter(|(_, block)| matches!(block, Block::Parameters(_)));
+    let parameters = parameters.filter_map(|(index, _)| {
+        let moved = [0, 1, 2].map(|axis| along(&joint.covariance().row(3 * index + axis), &adjoint));
+        let value = begun.joint.parameters_at(index)?.value + begun.means[index] - Vector3::from(moved);
+        Some((index, value))
+    });
+    Points { events: points, parameters: parameters.collect() }
 }
 
 /// A forward pass over a stretch. Errors are measured from the corrections of the joint, which are where the last
@@ -219,8 +236,15 @@ struct Pass {
 }
 
 impl Pass {
-    fn new(joint: Joint) -> Self {
-        let means = vec![Vector3::zeros(); joint.covariance().size() / 3];
+    fn new(joint: Joint, points: Option<&Points>) -> Self {
+        let mut means = vec![Vector3::zeros(); joint.covariance().size() / 3];
+        let mut joint = joint;
+        for (index, value) in points.iter().flat_map(|points| &points.parameters) {
+            if let Some(former) = joint.parameters_at(*index).map(|of| of.value) {
+                means[*index] = former - value;
+                joint.correct(*index, value - former);
+            }
+        }
         Self { joint, means }
     }
 
@@ -232,9 +256,14 @@ impl Pass {
         at: Option<&[Pose2]>,
         lenient: bool,
     ) -> (Residual, Trace) {
-        let mut trace = Trace { at: Vec::with_capacity(2), rows: Vec::with_capacity(2), update: None };
-        let mut poses = Vec::with_capacity(2);
+        let mut trace =
+            Trace { at: Vec::with_capacity(2), couplings: Vec::new(), rows: Vec::with_capacity(2), update: None };
         for (which, (index, state)) in event.participants.iter().enumerate() {
+            if let Some((row, by)) = self.joint.move_by_parameters(*index, state) {
+                let moved = by * self.means[row];
+                self.means[*index] += moved;
+                trace.couplings.push((*index, row, by));
+            }
             let former = self.joint.part(*index).correction;
             if let Some(at) = at {
                 // What a correction moves by from one measurement to the next, it was pushed by noise.
@@ -245,23 +274,22 @@ impl Pass {
                 self.means[*index] = Vector3::zeros();
             }
             self.joint.propagate(*index, state);
-            let correction = self.joint.part(*index).correction;
-            poses.push(correction.compose(&state.nominal));
-            trace.at.push((correction, self.means[*index]));
+            trace.at.push((self.joint.part(*index).correction, self.means[*index]));
         }
         for (index, _) in &event.participants {
             trace.rows.push([0, 1, 2].map(|axis| self.joint.covariance().row(3 * index + axis)));
         }
+        let (poses, influences) =
+            super::seen_poses(&self.joint, event.time, event.quantity, &event.participants);
         let linearized = match linearize(event.quantity, &poses) {
             Ok(linearized) => linearized,
             Err(reason) => return (Residual::without_measurement(Outcome::Skipped(reason)), trace),
         };
+        let participants =
+            super::participants(event.quantity, &event.participants, &influences, &linearized);
         let mut innovation = linearized.innovation;
-        let mut participants = Vec::with_capacity(2);
-        for ((index, _), sign) in event.participants.iter().zip(super::signs(event.quantity)) {
-            let jacobian = linearized.jacobian * *sign;
+        for Participant { index, jacobian } in &participants {
             innovation -= jacobian * self.means[*index];
-            participants.push(Participant { index: *index, jacobian });
         }
         let dimension = linearized.dimension;
         let threshold = config.gate[dimension - 1];
@@ -290,8 +318,7 @@ impl Pass {
     /// The joint at the end.
     fn ended(mut self) -> Joint {
         for (index, mean) in self.means.iter().enumerate() {
-            let correction = Pose2::exp(*mean).compose(&self.joint.part(index).correction);
-            self.joint.set_correction(index, correction);
+            self.joint.correct(index, *mean);
         }
         self.joint
     }

@@ -7,7 +7,7 @@ use super::map::{KindOfLandmark, KindedMap, MappedLandmark};
 use super::reduction;
 use crate::fact::{Noise, NominalState};
 use crate::geometry::Matrix3;
-use crate::joint::{ErrorForm, Joint, JointParts, Member, Participant, Update};
+use crate::joint::{Block, ErrorForm, Joint, JointParts, Member, Participant, Update};
 use crate::measurement::{Linearization, dimension, noise_matrix, of_point};
 use crate::sample::Relative;
 use crate::symmetric::Symmetric3;
@@ -177,7 +177,7 @@ impl Localizer {
     /// All hypotheses at a nominal state, the heaviest first.
     pub fn standings(&self, at: &NominalState) -> Vec<Standing> {
         let standing = |hypothesis: &Hypothesis| {
-            let (pose, covariance) = hypothesis.joint.estimate(ROBOT, at)?;
+            let (pose, covariance) = hypothesis.joint.estimate(ROBOT, Timestamp(0), at)?;
             Some(Standing { pose, covariance, weight: hypothesis.weight })
         };
         self.hypotheses.iter().filter_map(standing).collect()
@@ -254,7 +254,7 @@ impl Localizer {
         let said = |landmark: &MappedLandmark| sighting.recognition[landmark.kind.0];
         let possible = || self.map.landmarks.iter().enumerate().filter(|(_, landmark)| said(landmark) > 0.0);
         for (index, hypothesis) in self.hypotheses.iter().enumerate() {
-            let Some((pose, _)) = hypothesis.joint.estimate(ROBOT, &sighting.observer) else { continue };
+            let Some((pose, _)) = hypothesis.joint.estimate(ROBOT, Timestamp(0), &sighting.observer) else { continue };
             let covariance = hypothesis.joint.covariance().block(0, 0);
             for (_, of) in possible() {
                 let Ok(linearization) = of_point(&sighting.relative, &pose, of.position_m) else { continue };
@@ -316,7 +316,7 @@ pub(super) fn joint_at(pose: &Pose2, covariance: &Matrix3, at: &NominalState, up
     let correction = pose.compose(&at.nominal.inverse());
     let member = Member::new(ROBOT, BOOT, correction, at.nominal, at.noise_sum);
     let Symmetric3(lower) = Symmetric3::from_lower(covariance);
-    let parts = JointParts { members: vec![(member, true)], lower: lower.to_vec(), updates };
+    let parts = JointParts { blocks: vec![(Block::Robot(member), true)], lower: lower.to_vec(), updates };
     // A robot's block has six entries: there is nothing that could not fit.
     Joint::from_parts(ErrorForm::Invariant, parts).unwrap_or_else(|| Joint::new(ErrorForm::Invariant))
 }

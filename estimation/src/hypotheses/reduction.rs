@@ -50,7 +50,7 @@ fn opened(hypothesis: &Hypothesis) -> Option<Open> {
         pose: correction.compose(&nominal),
         covariance: hypothesis.joint.covariance().block(0, 0),
         weight: hypothesis.weight,
-        at: NominalState { nominal, noise_sum: folded_noise },
+        at: NominalState::new(nominal, folded_noise),
         updates: hypothesis.joint.updates(),
         changed: false,
     })

@@ -10,7 +10,7 @@ use crate::symmetric::Symmetric3;
 use crate::{LandmarkId, Pose2, Timestamp};
 
 const START: NominalState =
-    NominalState { nominal: Pose2::identity(), noise_sum: Symmetric3([0.0, 0.0, 0.0, 0.0, 0.0, 0.0]) };
+    NominalState { nominal: Pose2::identity(), noise_sum: Symmetric3([0.0; 6]), sensitivity: None };
 
 fn landmark(id: u32, kind: usize, x: f64, y: f64) -> MappedLandmark {
     MappedLandmark { id: LandmarkId(id), kind: KindOfLandmark(kind), position_m: Vector2::new(x, y) }

@@ -165,6 +165,19 @@ impl JointCovariance {
         self.set_diagonal(index, own);
     }
 
+    /// The error of block `i` moves with that of block `m`: `x_i <- x_i + A x_m`.
+    pub(crate) fn couple(&mut self, i: usize, m: usize, a: &Matrix3) {
+        let with_m = self.block(m, i);
+        let own = a * with_m;
+        let grown = Symmetric3::from_lower(&(own + own.transpose()))
+            .plus(Symmetric3::from_lower(&self.block(m, m)).congruence(a));
+        for other in (0..self.size / 3).filter(|other| *other != i) {
+            let block = self.block(i, other) + a * self.block(m, other);
+            self.set_cross(i, other, &block);
+        }
+        self.add_diagonal(i, grown);
+    }
+
     /// Prepares an update; `None` if the innovation covariance is not positive definite.
     pub(crate) fn prepare(
         &self,

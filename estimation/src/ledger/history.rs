@@ -3,29 +3,18 @@
 use super::Ledger;
 use crate::fact::NominalState;
 use crate::fold::{Fact, FactKey, fold, fold_blocks};
-use crate::geometry::Matrix3;
-use crate::joint::{ErrorForm, Joint, extrapolate};
+use crate::joint::{Joint, RobotView};
 use crate::symmetric::Symmetric3;
 use crate::{BootIndex, Pose2, RobotId, Timestamp};
 
 /// A robot's part of the joint after one fact: a point of its settled history.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SettledPoint {
     /// Time of the fact.
     pub time: Timestamp,
     /// On the trajectory of which boot the correction applies.
     pub boot: BootIndex,
-    /// A copy of the joint's view of the robot, enough to give its estimate until the next fact.
-    view: SettledView,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct SettledView {
-    correction: Pose2,
-    block: Matrix3,
-    folded_noise: Symmetric3,
-    nominal: Pose2,
-    form: ErrorForm,
+    view: RobotView,
 }
 
 impl Ledger {
@@ -36,14 +25,7 @@ impl Ledger {
         let mut joint = self.base_joint();
         let mut points = Vec::new();
         let mut add = |joint: &Joint, time| {
-            let Some((member, index)) = joint.member(robot).zip(joint.index(robot)) else { return };
-            let view = SettledView {
-                correction: member.correction,
-                block: joint.covariance().block(index, index),
-                folded_noise: member.folded_noise,
-                nominal: member.nominal,
-                form: self.config.form,
-            };
+            let Some((member, view)) = joint.member(robot).zip(joint.view(robot)) else { return };
             points.push(SettledPoint { time, boot: member.boot, view });
         };
         if let Some(cut) = self.cut() {
@@ -65,10 +47,9 @@ impl Ledger {
 }
 
 impl SettledPoint {
-    /// The estimate and its covariance (position in the map, yaw) at `state` of the nominal trajectory,
-    /// until the next fact.
-    pub fn estimate(&self, state: &NominalState) -> (Pose2, Symmetric3) {
-        let view = &self.view;
-        extrapolate(view.form, &view.correction, &view.nominal, view.folded_noise, &view.block, state)
+    /// The estimate and its covariance (position in the map, yaw) at `state` of the nominal trajectory, when the robot's clock
+    /// shows `time`, until the next fact.
+    pub fn estimate(&self, time: Timestamp, state: &NominalState) -> (Pose2, Symmetric3) {
+        self.view.estimate(time, state)
     }
 }

@@ -82,5 +82,5 @@ pub fn of_entries(
 
 /// The nominal state at the start of a boot, which has no noise behind it.
 fn start() -> NominalState {
-    NominalState { nominal: Pose2::identity(), noise_sum: crate::symmetric::Symmetric3::zero() }
+    NominalState::new(Pose2::identity(), crate::symmetric::Symmetric3::zero())
 }

@@ -188,8 +188,7 @@ impl Logs {
             nonce: 1,
             configuration: 0,
             nominal: Pose2::identity(),
-            continuation: None,
-        };
+            continuation: None, calibration: None };
         self.boot(robot, boot, 0)
     }
 
@@ -242,7 +241,7 @@ impl Scenario {
             let start = Pose2::new(3.0 * index as f64, (index % 2) as f64 * 2.0, 0.4 * index as f64);
             let prior = start.compose(&Pose2::exp(Vector3::from_column_slice(&draw(&self.prior))));
             let noise = Noise::from_sigmas(&self.prior);
-            let state = NominalState { nominal: Pose2::identity(), noise_sum: Symmetric3::zero() };
+            let state = NominalState::new(Pose2::identity(), Symmetric3::zero());
             logs.first_boot(*robot);
             for (index, quantity) in templates(*robot).iter().enumerate() {
                 let noise = Noise::from_sigmas(&sigmas(quantity));

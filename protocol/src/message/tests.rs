@@ -26,7 +26,7 @@ fn rng(seed: u64) -> ChaCha8Rng {
 }
 
 fn state() -> NominalState {
-    NominalState { nominal: Pose2::new(1.0, 2.0, 0.5), noise_sum: Symmetric3::diagonal(1e-4, 1e-4, 1e-6) }
+    NominalState::new(Pose2::new(1.0, 2.0, 0.5), Symmetric3::diagonal(1e-4, 1e-4, 1e-6))
 }
 
 /// What varies with the team and its age, at the ends the sizes are stated for.

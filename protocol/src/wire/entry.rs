@@ -316,8 +316,7 @@ impl TryFrom<WireBody> for Body {
                 continuation: continuation
                     .map(Continuation::try_from)
                     .transpose()
-                    .map_err(inside("boot.continuation"))?,
-            }),
+                    .map_err(inside("boot.continuation"))?, calibration: None }),
             WireBody::Profile { index, noise } => Self::Profile(Profile {
                 index,
                 noise: check::noise("profile.noise", noise.dimension, noise.lower)?,

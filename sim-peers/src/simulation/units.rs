@@ -29,7 +29,7 @@ fn symmetric(of: Symmetric3, scale: f64) -> Symmetric3 {
 }
 
 fn state(of: NominalState, scale: f64) -> NominalState {
-    NominalState { nominal: pose(&of.nominal, scale), noise_sum: symmetric(of.noise_sum, scale) }
+    NominalState::new(pose(&of.nominal, scale), symmetric(of.noise_sum, scale))
 }
 
 fn boot(of: Boot, scale: f64) -> Boot {

@@ -23,7 +23,7 @@ pub(super) fn difference(scenario: &Scenario, seed: u64) -> Result<f64, SurveyEr
     let diverged = |what: &str| SurveyError::Diverged { study: NAME, seed, what: what.to_owned() };
     let prior = world.run.priors.get(&ROBOT).ok_or_else(|| diverged("the robot was told no start"))?;
     let (sigma_m, sigma_rad) = (prior.sigma_position_m, prior.sigma_heading_rad);
-    let start = NominalState { nominal: Pose2::identity(), noise_sum: Symmetric3::zero() };
+    let start = NominalState::new(Pose2::identity(), Symmetric3::zero());
 
     // Every landmark is of a kind of its own.
     let mut map = map_of(&scenario);
@@ -70,7 +70,7 @@ struct Facts {
 impl Facts {
     fn begin(time: Timestamp) -> Self {
         let nominal = Pose2::identity();
-        let boot = Boot { time, nonce: 0, configuration: 0, nominal, continuation: None };
+        let boot = Boot { time, nonce: 0, configuration: 0, nominal, continuation: None, calibration: None };
         Self { all: vec![ReferenceFact { id: id(0), time, content: FactContent::Boot(boot) }] }
     }
 

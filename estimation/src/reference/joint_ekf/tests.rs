@@ -14,7 +14,7 @@ const ONE: RobotId = RobotId(1);
 const TWO: RobotId = RobotId(2);
 
 fn still(nominal: Pose2) -> NominalState {
-    NominalState { nominal, noise_sum: Symmetric3::zero() }
+    NominalState::new(nominal, Symmetric3::zero())
 }
 
 fn at(seconds: f64) -> Timestamp {
@@ -173,10 +173,7 @@ fn an_outlier_is_rejected_and_leaves_only_the_noise_of_its_participants() {
     for form in FORMS {
         let mut logs = Logs::default();
         place(&mut logs, ONE, Pose2::identity(), &[0.1, 0.1, 0.05]);
-        let moved = NominalState {
-            nominal: Pose2::new(2.0, 0.0, 0.0),
-            noise_sum: Symmetric3::diagonal(0.01, 0.02, 0.0),
-        };
+        let moved = NominalState::new(Pose2::new(2.0, 0.0, 0.0), Symmetric3::diagonal(0.01, 0.02, 0.0));
         let far = Quantity::Absolute(Absolute::Position([9.0, 0.0]));
         let id = logs.observation(ONE, at(1.0), far, explicit(&[0.1, 0.1]), moved, None);
         let estimate = fold(form, &logs);
@@ -232,7 +229,7 @@ fn facts_of_robots_without_a_place_or_of_another_boot_are_skipped() {
     let heading = Quantity::Absolute(Absolute::Heading(0.0));
     let misfit = logs.observation(ONE, at(1.6), heading, explicit(&[0.1, 0.1]), origin, None);
     let restart =
-        Boot { time: at(2.0), nonce: 2, configuration: 0, nominal: Pose2::identity(), continuation: None };
+        Boot { time: at(2.0), nonce: 2, configuration: 0, nominal: Pose2::identity(), continuation: None, calibration: None };
     logs.boot(ONE, restart, 1);
     let stale = logs.observation(ONE, at(3.0), heading, explicit(&[0.1]), origin, None);
     let estimate = fold(ErrorForm::Invariant, &logs);
@@ -274,10 +271,7 @@ fn split_run(gap: Symmetric3) -> (Logs, Logs) {
         Quantity::Robot { robot: TWO, relative: Relative::RangeBearing { range_m: 4.1, bearing_rad: 0.3 } };
     let fix = Quantity::Absolute(Absolute::Position([2.3, 0.6]));
     // N and C of robot one at 1 s, at the break, and at 3 s; robot two stands still.
-    let state = |x: f64, y: f64, yaw: f64, c: f64| NominalState {
-        nominal: Pose2::new(x, y, yaw),
-        noise_sum: Symmetric3([c, 0.1 * c, 1.5 * c, 0.05 * c, -0.1 * c, 0.2 * c]),
-    };
+    let state = |x: f64, y: f64, yaw: f64, c: f64| NominalState::new(Pose2::new(x, y, yaw), Symmetric3([c, 0.1 * c, 1.5 * c, 0.05 * c, -0.1 * c, 0.2 * c]));
     let (early, broken, late) =
         (state(0.8, 0.1, 0.2, 0.01), state(1.5, 0.4, 0.5, 0.02), state(2.2, 0.9, 0.8, 0.035));
     let begin = || {
@@ -296,14 +290,11 @@ fn split_run(gap: Symmetric3) -> (Logs, Logs) {
     let nominal = shift.compose(&broken.nominal);
     split.boot(
         ONE,
-        Boot { time: at(2.0), nonce: 2, configuration: 0, nominal, continuation: Some(continuation) },
+        Boot { time: at(2.0), nonce: 2, configuration: 0, nominal, continuation: Some(continuation), calibration: None },
         1,
     );
     let ad = adjoint(&shift);
-    let observer = NominalState {
-        nominal: shift.compose(&late.nominal),
-        noise_sum: late.noise_sum.minus(broken.noise_sum).congruence(&ad),
-    };
+    let observer = NominalState::new(shift.compose(&late.nominal), late.noise_sum.minus(broken.noise_sum).congruence(&ad));
     let observation = Observation { time: at(3.0), quantity: fix, noise: explicit(&[0.1, 0.1]), observer };
     split.push(ONE, BootIndex(1), Body::Observation(observation));
     (whole, split)
@@ -358,8 +349,7 @@ fn a_lost_boot_forgets_that_robot_and_keeps_the_marginal_of_the_others() {
             nonce: 2,
             configuration: 0,
             nominal: Pose2::identity(),
-            continuation: None,
-        };
+            continuation: None, calibration: None };
         logs.boot(ONE, restart, 1);
         let after = fold(form, &logs);
         assert_eq!(after.covariance.robots(), [TWO]);

@@ -179,8 +179,7 @@ mod tests {
             nonce: 1,
             configuration,
             nominal: Pose2::identity(),
-            continuation: None,
-        };
+            continuation: None, calibration: None };
         let noise = Noise::from_sigmas(&[0.1, 0.1]);
         let mut entries = vec![
             entry(robot, 0, Body::Boot(boot)),
@@ -191,7 +190,7 @@ mod tests {
                 time: Timestamp(number),
                 quantity: Quantity::Absolute(Absolute::Position([f64::from(robot), 0.0])),
                 noise: NoiseRef::Profile(0),
-                observer: NominalState { nominal: Pose2::identity(), noise_sum: Symmetric3::zero() },
+                observer: NominalState::new(Pose2::identity(), Symmetric3::zero()),
             };
             entries.push(entry(robot, u64::try_from(number).unwrap(), Body::Observation(observation)));
         }

@@ -185,7 +185,7 @@ fn indefinite_covariances_are_named_wherever_they_are() {
         let time = Timestamp(0);
         let continuation = Some(Continuation { previous: BootIndex(0), time, last, gap });
         let nominal = Pose2::identity();
-        Body::Boot(Boot { time, nonce: 1, configuration: 2, nominal, continuation })
+        Body::Boot(Boot { time, nonce: 1, configuration: 2, nominal, continuation, calibration: None })
     };
     assert_eq!(field(boot(state(), bad)), "boot.continuation.gap");
     assert_eq!(field(boot(bad_state, Symmetric3::zero())), "boot.continuation.last.noise_sum");
