@@ -9,7 +9,7 @@ use crate::fact::{Boot, EntryId, Fingerprint, Noise, NominalState, Quantity};
 use crate::geometry::{Matrix3, Vector2, Vector3};
 use crate::joint::{ErrorForm, Joint, ParameterKind, Participant, Update, clock_influence};
 use crate::measurement::{self, Linearization, Unusable};
-use crate::{BootIndex, Pose2, RobotId, Sequence, Timestamp};
+use crate::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timestamp};
 
 /// Raised whenever the same facts would give other bits.
 pub const FOLD_VERSION: u32 = 2;
@@ -128,6 +128,9 @@ pub enum SkipReason {
     Noise,
     /// A robot observed itself.
     Itself,
+    /// The landmark has no place in the team's map yet, and a range or a bearing alone does not give it one; nor does
+    /// the additive form map landmarks.
+    NotMapped(LandmarkId),
 }
 
 /// What the fold did with a fact.
@@ -135,7 +138,7 @@ pub enum SkipReason {
 pub enum Outcome {
     /// A boot took effect.
     Booted,
-    /// A robot was placed in the map by its prior.
+    /// A robot was placed in the map by its prior, or a landmark by whoever saw it first.
     Placed,
     /// The joint was updated.
     Used,
@@ -225,9 +228,21 @@ fn fold_observation(
     }
     let taken = taken(joint, key, quantity, observer, other)?;
     for (index, state) in &taken {
-        joint.propagate(*index, state);
+        if let Some(state) = state {
+            joint.propagate(*index, state);
+        }
     }
     let (poses, influences) = seen_poses(joint, key.time, quantity, &taken);
+    if let (Quantity::Feature { landmark, relative }, [from]) = (quantity, poses.as_slice()) {
+        let (position, spread) =
+            measurement::point_of(relative, &noise).ok_or(SkipReason::NotMapped(*landmark))?;
+        if joint.form() == ErrorForm::Additive {
+            return Err(SkipReason::NotMapped(*landmark));
+        }
+        let mount = influences.first().map(|(index, _, by)| (*index, *by));
+        joint.map_landmark(*landmark, taken[0].0, mount, from, position, &spread);
+        return Ok(Residual::without_measurement(Outcome::Placed));
+    }
     let at = linearize(quantity, &poses)?;
     let mut participants = participants(quantity, &taken, &influences, &at);
     update(joint, config, &at, &noise, &mut participants)
@@ -237,15 +252,21 @@ fn fold_observation(
 /// [`taken`], and the derivative of that pose's error.
 type Influence = (usize, usize, Matrix3);
 
+/// A block that takes part, and the nominal state of the robot in it; a landmark has none.
+type Taken = (usize, Option<NominalState>);
+
 /// The poses of those who take part as the measurement sees them, in the order of [`taken`]: of the observer the frame it sees
 /// from, and of the robot that was seen the pose at the observer's time, whose clock may differ.
 fn seen_poses(
     joint: &Joint,
     time: Timestamp,
     quantity: &Quantity,
-    taken: &[(usize, NominalState)],
+    taken: &[Taken],
 ) -> (Vec<Pose2>, Vec<Influence>) {
-    let own = |(index, state): &(usize, NominalState)| joint.part(*index).correction.compose(&state.nominal);
+    let own = |(index, state): &Taken| {
+        let frame = *joint.frame(*index);
+        state.as_ref().map_or(frame, |state| frame.compose(&state.nominal))
+    };
     let mut poses: Vec<Pose2> = taken.iter().map(own).collect();
     let mut influences = Vec::new();
     if matches!(quantity, Quantity::Absolute(_)) {
@@ -262,7 +283,7 @@ fn seen_poses(
         let turned = Pose2::new(0.0, 0.0, -frame.yaw_rad()).adjoint();
         influences.push((index, 0, poses[0].adjoint() * turned));
     }
-    let Some((index, NominalState { sensitivity: Some(sensitivity), .. })) = taken.get(1) else {
+    let Some((index, Some(NominalState { sensitivity: Some(sensitivity), .. }))) = taken.get(1) else {
         return (poses, influences);
     };
     let clocks = [(joint.part(*index).robot, 1.0), (observer, -1.0)].map(|(robot, sign)| {
@@ -283,7 +304,7 @@ fn seen_poses(
 /// The blocks that the prediction depends on, and how.
 fn participants(
     quantity: &Quantity,
-    taken: &[(usize, NominalState)],
+    taken: &[Taken],
     influences: &[Influence],
     at: &Linearization,
 ) -> Vec<Participant> {
@@ -305,23 +326,27 @@ fn usable(quantity: &Quantity, noise: Option<&Noise>) -> Result<Noise, SkipReaso
     noise.filter(fits).copied().ok_or(SkipReason::Noise)
 }
 
-/// Who takes part in a measurement, the observer first, and their nominal states at its time.
+/// Who takes part in a measurement, the observer first, and their nominal states at its time. A landmark that is not in the
+/// team's map yet does not.
 fn taken(
     joint: &Joint,
     key: &FactKey,
     quantity: &Quantity,
     observer: &NominalState,
     other: Option<&(BootIndex, NominalState)>,
-) -> Result<Vec<(usize, NominalState)>, SkipReason> {
+) -> Result<Vec<Taken>, SkipReason> {
     let a = key.id.robot;
     let mut taken = Vec::with_capacity(2);
-    taken.push((participant(joint, a, key.id.boot)?, *observer));
+    taken.push((participant(joint, a, key.id.boot)?, Some(*observer)));
     if let Quantity::Robot { robot: b, .. } = quantity {
         if *b == a {
             return Err(SkipReason::Itself);
         }
         let (boot, state) = other.ok_or(SkipReason::NotPlaced(*b))?;
-        taken.push((participant(joint, *b, *boot)?, *state));
+        taken.push((participant(joint, *b, *boot)?, Some(*state)));
+    }
+    if let Quantity::Feature { landmark, .. } = quantity {
+        taken.extend(joint.landmark_index(*landmark).map(|index| (index, None)));
     }
     Ok(taken)
 }
@@ -332,6 +357,9 @@ fn linearize(quantity: &Quantity, poses: &[Pose2]) -> Result<Linearization, Skip
         (Quantity::Robot { relative, .. }, [a, b]) => measurement::of_robot(relative, a, b),
         (Quantity::Landmark { position_m: [x, y], relative, .. }, [a]) => {
             measurement::of_point(relative, a, Vector2::new(*x, *y))
+        }
+        (Quantity::Feature { relative, .. }, [a, landmark]) => {
+            measurement::of_point(relative, a, landmark.position())
         }
         (Quantity::Absolute(absolute), [a]) => Ok(measurement::of_map(absolute, a)),
         _ => return Err(SkipReason::Noise),
@@ -346,7 +374,7 @@ fn linearize(quantity: &Quantity, poses: &[Pose2]) -> Result<Linearization, Skip
 /// relative measurement moves with the observer the other way.
 fn signs(quantity: &Quantity) -> &'static [f64] {
     match quantity {
-        Quantity::Robot { .. } => &[-1.0, 1.0],
+        Quantity::Robot { .. } | Quantity::Feature { .. } => &[-1.0, 1.0],
         Quantity::Landmark { .. } => &[-1.0],
         Quantity::Absolute(_) => &[1.0],
     }
@@ -370,9 +398,9 @@ fn update(
 
 fn dimension(quantity: &Quantity) -> usize {
     match quantity {
-        Quantity::Robot { relative, .. } | Quantity::Landmark { relative, .. } => {
-            measurement::dimension(relative)
-        }
+        Quantity::Robot { relative, .. }
+        | Quantity::Landmark { relative, .. }
+        | Quantity::Feature { relative, .. } => measurement::dimension(relative),
         Quantity::Absolute(absolute) => measurement::absolute_dimension(absolute),
     }
 }

@@ -10,7 +10,7 @@ pub(crate) use covariance::Prepared;
 pub(crate) use view::{RobotView, clock_influence};
 
 use crate::fact::{Boot, Calibration, Continuation, NominalState};
-use crate::geometry::{Matrix3, Vector3};
+use crate::geometry::{Matrix3, Vector2, Vector3};
 use crate::symmetric::Symmetric3;
 use crate::{BootIndex, LandmarkId, Pose2, RobotId, Timestamp};
 
@@ -341,9 +341,43 @@ impl Joint {
         }
     }
 
-    /// Measures a robot's error from another correction. For windows of the fold.
-    pub(crate) fn set_correction(&mut self, index: usize, correction: Pose2) {
-        self.part_mut(index).correction = correction;
+    /// What the error of a block is the error of: a robot's correction, a landmark's pose.
+    pub(crate) fn frame(&self, index: usize) -> &Pose2 {
+        match &self.blocks[index] {
+            Block::Landmark(mapped) => &mapped.pose,
+            _ => &self.part(index).correction,
+        }
+    }
+
+    /// Measures a block's error from another correction or pose. For windows of the fold.
+    pub(crate) fn set_frame(&mut self, index: usize, frame: Pose2) {
+        match &mut self.blocks[index] {
+            Block::Landmark(mapped) => mapped.pose = frame,
+            _ => self.part_mut(index).correction = frame,
+        }
+    }
+
+    /// Gives a landmark a place, seen from the frame `from` of the robot in a block at `position`, with covariance `spread` there.
+    ///
+    /// It is a frame turned as the one it was seen from, and its error is that robot's with the noise of the measurement:
+    /// `xi_l = xi_a + Ad_{X_l} n`. `mount` is what else moves the frame it is seen from, and how.
+    pub(crate) fn map_landmark(
+        &mut self,
+        landmark: LandmarkId,
+        observer: usize,
+        mount: Option<(usize, Matrix3)>,
+        from: &Pose2,
+        position: Vector2,
+        spread: &Matrix3,
+    ) {
+        let pose = from.compose(&Pose2::new(position.x, position.y, 0.0));
+        let index = self.add(Block::Landmark(MappedLandmark { landmark, pose }));
+        self.covariance.couple(index, observer, &Matrix3::identity());
+        if let Some((mount, by)) = mount {
+            self.covariance.couple(index, mount, &by);
+        }
+        let noise = Symmetric3::from_lower(spread).congruence(&pose.adjoint());
+        self.covariance.add_diagonal(index, noise);
     }
 
     /// Takes an update from the covariance, and leaves the corrections. For windows of the fold.

@@ -108,6 +108,19 @@ pub fn of_point(relative: &Relative, observer: &Pose2, point: Vector2) -> Result
     })
 }
 
+/// The point that a robot saw, in the frame it sees from, and the covariance of that; `None` if the kind does not give a point.
+pub fn point_of(relative: &Relative, noise: &Matrix3) -> Option<(Vector2, Matrix3)> {
+    match *relative {
+        Relative::Position { x_m, y_m } => Some((Vector2::new(x_m, y_m), *noise)),
+        Relative::RangeBearing { range_m, bearing_rad } => {
+            let (s, c) = (libm::sin(bearing_rad), libm::cos(bearing_rad));
+            let by = Matrix3::new(c, -range_m * s, 0.0, s, range_m * c, 0.0, 0.0, 0.0, 0.0);
+            Some((Vector2::new(range_m * c, range_m * s), by * noise * by.transpose()))
+        }
+        Relative::Pose(_) | Relative::Range { .. } | Relative::Bearing { .. } => None,
+    }
+}
+
 /// The robot itself against the map.
 pub fn of_map(absolute: &Absolute, robot: &Pose2) -> Linearization {
     match *absolute {

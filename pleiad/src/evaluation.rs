@@ -174,6 +174,7 @@ fn kind(quantity: &Quantity) -> String {
     match quantity {
         Quantity::Robot { relative, .. } => format!("{} to a robot", of(relative)),
         Quantity::Landmark { relative, .. } => format!("{} to a landmark", of(relative)),
+        Quantity::Feature { relative, .. } => format!("{} to a landmark of the team's map", of(relative)),
         Quantity::Absolute(Absolute::Position(_)) => "position fix".to_owned(),
         Quantity::Absolute(Absolute::Heading(_)) => "heading".to_owned(),
         Quantity::Absolute(Absolute::Pose(_)) => "pose in the map".to_owned(),

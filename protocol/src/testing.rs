@@ -103,7 +103,7 @@ fn relative(rng: &mut impl Rng) -> (Relative, u8) {
 }
 
 fn quantity(rng: &mut impl Rng) -> (Quantity, u8) {
-    match rng.random_range(0..5) {
+    match rng.random_range(0..6) {
         0 => {
             let (relative, dimension) = relative(rng);
             (Quantity::Robot { robot: RobotId(small(rng)), relative }, dimension)
@@ -112,6 +112,10 @@ fn quantity(rng: &mut impl Rng) -> (Quantity, u8) {
             let (relative, dimension) = relative(rng);
             let position_m = [number(rng), number(rng)];
             (Quantity::Landmark { landmark: LandmarkId(small(rng)), position_m, relative }, dimension)
+        }
+        5 => {
+            let (relative, dimension) = relative(rng);
+            (Quantity::Feature { landmark: LandmarkId(small(rng)), relative }, dimension)
         }
         2 => (Quantity::Absolute(Absolute::Pose(pose(rng))), 3),
         3 => (Quantity::Absolute(Absolute::Position([number(rng), number(rng)])), 2),

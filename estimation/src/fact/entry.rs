@@ -212,6 +212,13 @@ pub enum Quantity {
         /// Where, in the observer's body frame.
         relative: Relative,
     },
+    /// A landmark whose place is not known; the team finds it.
+    Feature {
+        /// Which.
+        landmark: LandmarkId,
+        /// Where, in the observer's body frame.
+        relative: Relative,
+    },
     /// The observer itself, against the map.
     Absolute(Absolute),
 }

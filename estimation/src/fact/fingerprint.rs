@@ -147,6 +147,11 @@ impl Canonical {
                 self.tag(4);
                 self.number(*heading);
             }
+            Quantity::Feature { landmark, relative } => {
+                self.tag(5);
+                self.word(u64::from(landmark.0));
+                self.relative(relative);
+            }
         }
     }
 

@@ -9,8 +9,7 @@
 //! So a motion common to the team stays in the null space of every relative measurement, wherever each of them is
 //! linearized.
 
-use crate::fact::NominalState;
-use crate::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, fold, linearize, taken};
+use crate::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, Taken, fold, linearize, taken};
 use crate::geometry::{Matrix3, Vector3};
 use crate::joint::{Block, ErrorForm, Joint, Participant, Prepared};
 use crate::measurement;
@@ -113,6 +112,9 @@ fn is_measurement(joint: &Joint, key: &FactKey, fact: &Fact) -> bool {
         Fact::Observation { quantity: Quantity::Absolute(crate::fact::Absolute::Pose(_)), .. } => {
             joint.index(key.id.robot).is_some()
         }
+        Fact::Observation { quantity: Quantity::Feature { landmark, .. }, .. } => {
+            joint.landmark_index(*landmark).is_some()
+        }
         Fact::Observation { .. } => true,
     }
 }
@@ -122,7 +124,7 @@ struct Event<'a> {
     time: Timestamp,
     quantity: &'a Quantity,
     noise: Matrix3,
-    participants: Vec<(usize, NominalState)>,
+    participants: Vec<Taken>,
 }
 
 /// Where it is linearized.
@@ -259,22 +261,26 @@ impl Pass {
         let mut trace =
             Trace { at: Vec::with_capacity(2), couplings: Vec::new(), rows: Vec::with_capacity(2), update: None };
         for (which, (index, state)) in event.participants.iter().enumerate() {
-            if let Some((row, by)) = self.joint.move_by_parameters(*index, state) {
+            if let Some((row, by)) =
+                state.as_ref().and_then(|state| self.joint.move_by_parameters(*index, state))
+            {
                 let moved = by * self.means[row];
                 self.means[*index] += moved;
                 trace.couplings.push((*index, row, by));
             }
-            let former = self.joint.part(*index).correction;
+            let former = *self.joint.frame(*index);
             if let Some(at) = at {
                 // What a correction moves by from one measurement to the next, it was pushed by noise.
-                self.joint.set_correction(*index, at[which]);
+                self.joint.set_frame(*index, at[which]);
                 self.means[*index] -= at[which].compose(&former.inverse()).log();
             } else {
-                self.joint.set_correction(*index, Pose2::exp(self.means[*index]).compose(&former));
+                self.joint.set_frame(*index, Pose2::exp(self.means[*index]).compose(&former));
                 self.means[*index] = Vector3::zeros();
             }
-            self.joint.propagate(*index, state);
-            trace.at.push((self.joint.part(*index).correction, self.means[*index]));
+            if let Some(state) = state {
+                self.joint.propagate(*index, state);
+            }
+            trace.at.push((*self.joint.frame(*index), self.means[*index]));
         }
         for (index, _) in &event.participants {
             trace.rows.push([0, 1, 2].map(|axis| self.joint.covariance().row(3 * index + axis)));

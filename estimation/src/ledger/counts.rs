@@ -42,7 +42,7 @@ impl FactCounts {
     pub(super) fn add(&mut self, record: &FactRecord) {
         let Fact::Observation { quantity, .. } = &record.fact else { return };
         match quantity {
-            Quantity::Robot { .. } => self.relative += 1,
+            Quantity::Robot { .. } | Quantity::Feature { .. } => self.relative += 1,
             Quantity::Landmark { .. } | Quantity::Absolute(Absolute::Position(_) | Absolute::Heading(_)) => {
                 self.absolute += 1;
             }

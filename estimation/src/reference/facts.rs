@@ -120,7 +120,7 @@ pub fn facts_from_entries(entries: &[Entry]) -> Vec<ReferenceFact> {
                         }
                         Some(Answer::Void(_)) | None => continue,
                     },
-                    Quantity::Landmark { .. } | Quantity::Absolute(_) => None,
+                    Quantity::Landmark { .. } | Quantity::Feature { .. } | Quantity::Absolute(_) => None,
                 };
                 facts.push(ReferenceFact {
                     id: *id,

@@ -151,7 +151,7 @@ pub fn linearize(
                 d_measurement_d_observed: Some(&d_z * two_by_three(&turn_back, &(turn_back * lever))),
             })
         }
-        (Quantity::Robot { .. }, None) => Err(SkipReason::Malformed),
+        (Quantity::Robot { .. }, None) | (Quantity::Feature { .. }, _) => Err(SkipReason::Malformed),
         (Quantity::Landmark { relative: Relative::Pose(_), .. }, _) => Err(SkipReason::LandmarkHasNoHeading),
         (Quantity::Landmark { relative, position_m: [x, y], .. }, _) => {
             let place = Vector2::new(*x, *y);

@@ -136,7 +136,7 @@ impl PerTickEkf {
         self.advance_to(measurement.time);
         let observed = match measurement.quantity {
             Quantity::Robot { robot, .. } => Some(robot),
-            Quantity::Landmark { .. } | Quantity::Absolute(_) => None,
+            Quantity::Landmark { .. } | Quantity::Feature { .. } | Quantity::Absolute(_) => None,
         };
         if observed == Some(measurement.observer) {
             return Outcome::Skipped(SkipReason::Malformed);

@@ -89,6 +89,7 @@ pub fn observe(template: &Quantity, observer: &Pose2, observed: Option<&Pose2>) 
             position_m: *position_m,
             relative: seen(relative, &Pose2::new(position_m[0], position_m[1], 0.0)),
         },
+        Quantity::Feature { .. } => template.clone(),
         Quantity::Absolute(absolute) => Quantity::Absolute(match absolute {
             Absolute::Pose(_) => Absolute::Pose(*observer),
             Absolute::Position(_) => Absolute::Position([observer.x_m(), observer.y_m()]),
@@ -124,7 +125,9 @@ pub fn templates(robot: RobotId) -> Vec<Quantity> {
 /// Standard deviations of a kind's noise.
 pub fn sigmas(quantity: &Quantity) -> Vec<f64> {
     match quantity {
-        Quantity::Robot { relative, .. } | Quantity::Landmark { relative, .. } => match relative {
+        Quantity::Robot { relative, .. }
+        | Quantity::Landmark { relative, .. }
+        | Quantity::Feature { relative, .. } => match relative {
             Relative::Pose(_) => vec![0.05, 0.05, 0.03],
             Relative::Position { .. } => vec![0.06, 0.04],
             Relative::Range { .. } => vec![0.05],
@@ -150,6 +153,9 @@ pub fn disturbed(quantity: &Quantity, n: &[f64]) -> Quantity {
     };
     match quantity {
         Quantity::Robot { robot, relative } => Quantity::Robot { robot: *robot, relative: shaken(relative) },
+        Quantity::Feature { landmark, relative } => {
+            Quantity::Feature { landmark: *landmark, relative: shaken(relative) }
+        }
         Quantity::Landmark { landmark, position_m, relative } => {
             Quantity::Landmark { landmark: *landmark, position_m: *position_m, relative: shaken(relative) }
         }

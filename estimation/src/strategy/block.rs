@@ -95,7 +95,7 @@ impl Block {
                 let seen = measurement::of_point(relative, &self.pose(&at.state), Vector2::new(*x, *y));
                 (seen.ok()?, -1.0)
             }
-            Quantity::Robot { .. } => return None,
+            Quantity::Robot { .. } | Quantity::Feature { .. } => return None,
         };
         let measured = Measured {
             dimension: linearization.dimension,

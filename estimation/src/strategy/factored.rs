@@ -264,7 +264,7 @@ impl Core for Factored {
             Quantity::Landmark { position_m: [x, y], relative, .. } => {
                 (measurement::of_point(relative, &member.pose, Vector2::new(*x, *y)), -1.0)
             }
-            Quantity::Robot { .. } => return,
+            Quantity::Robot { .. } | Quantity::Feature { .. } => return,
         };
         let Ok(linearization) = linearization else {
             self.counts.refused += 1;

@@ -6,6 +6,8 @@
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small numbers of a fixture")]
 #![allow(clippy::expect_used, missing_docs, reason = "a fixture")]
 
+pub mod wander;
+
 use pleiad_estimation::fact::{
     Absolute, Answer, Body, Boot, Entry, EntryId, Half, Noise, NoiseRef, Observation, Profile, Quantity,
 };

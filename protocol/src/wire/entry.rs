@@ -102,6 +102,7 @@ enum WireQuantity {
     Pose(WirePose),
     Position([f64; 2]),
     Heading(f64),
+    Feature(u32, WireRelative),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -181,6 +182,7 @@ impl From<&Quantity> for WireQuantity {
             Quantity::Landmark { landmark, position_m, relative } => {
                 Self::Landmark(landmark.0, *position_m, relative.into())
             }
+            Quantity::Feature { landmark, relative } => Self::Feature(landmark.0, relative.into()),
             Quantity::Absolute(Absolute::Pose(pose)) => Self::Pose(check::wire_pose(pose)),
             Quantity::Absolute(Absolute::Position(position)) => Self::Position(*position),
             Quantity::Absolute(Absolute::Heading(heading)) => Self::Heading(*heading),
@@ -201,6 +203,9 @@ impl TryFrom<WireQuantity> for Quantity {
                 position_m: check::pair("position_m", position_m)?,
                 relative: relative.try_into()?,
             },
+            WireQuantity::Feature(landmark, relative) => {
+                Self::Feature { landmark: LandmarkId(landmark), relative: relative.try_into()? }
+            }
             WireQuantity::Pose(pose) => Self::Absolute(Absolute::Pose(check::pose("pose", pose)?)),
             WireQuantity::Position(position) => {
                 Self::Absolute(Absolute::Position(check::pair("position", position)?))
@@ -218,7 +223,9 @@ fn dimension(quantity: &Quantity) -> (u8, &'static str) {
         Quantity::Absolute(Absolute::Heading(_)) => (1, "1 for a heading"),
         Quantity::Absolute(Absolute::Position(_)) => (2, "2 for a position"),
         Quantity::Absolute(Absolute::Pose(_)) => (3, "3 for a pose"),
-        Quantity::Robot { relative, .. } | Quantity::Landmark { relative, .. } => match relative {
+        Quantity::Robot { relative, .. }
+        | Quantity::Landmark { relative, .. }
+        | Quantity::Feature { relative, .. } => match relative {
             Relative::Range { .. } => (1, "1 for a range"),
             Relative::Bearing { .. } => (1, "1 for a bearing"),
             Relative::RangeBearing { .. } => (2, "2 for range and bearing"),

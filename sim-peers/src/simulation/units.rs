@@ -67,6 +67,10 @@ fn measurement(of: &Measurement, scale: f64) -> Measurement {
             let position_m = position_m.map(|axis| scale * axis);
             (Quantity::Landmark { landmark, position_m, relative }, scales)
         }
+        Quantity::Feature { landmark, relative: seen } => {
+            let (relative, scales) = relative(seen, scale);
+            (Quantity::Feature { landmark, relative }, scales)
+        }
         Quantity::Absolute(Absolute::Pose(at)) => {
             (Quantity::Absolute(Absolute::Pose(pose(&at, scale))), [scale, scale, 1.0])
         }

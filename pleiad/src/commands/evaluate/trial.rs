@@ -144,7 +144,7 @@ fn target(quantity: &Quantity) -> String {
         Quantity::Robot { robot, relative } => {
             format!("robot {robot} {:?}", std::mem::discriminant(relative))
         }
-        Quantity::Landmark { landmark, relative, .. } => {
+        Quantity::Landmark { landmark, relative, .. } | Quantity::Feature { landmark, relative } => {
             format!("landmark {landmark} {:?}", std::mem::discriminant(relative))
         }
         Quantity::Absolute(absolute) => format!("{:?}", std::mem::discriminant(absolute)),

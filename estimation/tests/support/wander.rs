@@ -1,0 +1,248 @@
+//! A team that wanders, and how what it does becomes readings. It knows of no derivative and no covariance: what it says is
+//! true is an independent source for what the filter finds.
+
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, missing_docs, reason = "a fixture")]
+
+use pleiad_estimation::fact::{
+    Absolute, Answer, Body, Boot, Calibration, Entry, EntryId, Half, Noise, NoiseRef, Observation, Quantity,
+    extension_of_boot, extension_of_state,
+};
+use pleiad_estimation::fold::FoldConfig;
+use pleiad_estimation::geometry::{Vector3, wrap_angle};
+use pleiad_estimation::joint::Joint;
+use pleiad_estimation::ledger::Ledger;
+use pleiad_estimation::motion::Step;
+use pleiad_estimation::nominal::NominalTrajectory;
+use pleiad_estimation::sample::Relative;
+use pleiad_estimation::symmetric::Symmetric3;
+use pleiad_estimation::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timestamp};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+pub const TICK_NS: i64 = 50_000_000;
+pub const TICK_S: f64 = 0.05;
+const NOISE: [f64; 3] = [0.01, 0.0, 0.01];
+const PRIOR: [f64; 3] = [0.05, 0.05, 0.02];
+const SIGHTING: [f64; 2] = [0.05, 0.01];
+const GPS: f64 = 0.2;
+
+/// What is wrong with a robot, in the units and order of [`Calibration`]; clocks are off by whole ticks.
+#[derive(Clone, Copy, Default)]
+pub struct Wrong {
+    pub motion: [f64; 3],
+    pub mount: [f64; 3],
+    pub late_ticks: i64,
+}
+
+pub struct Robot {
+    pub wrong: Wrong,
+    pub told: Option<Calibration>,
+    /// True poses by tick, from tick 0 at true time -20 ticks.
+    pub truth: Vec<Pose2>,
+    pub trajectory: NominalTrajectory,
+    pub entries: Vec<Entry>,
+}
+
+pub const BEFORE: i64 = 20;
+
+impl Robot {
+    /// The true pose when its clock shows the end of a tick.
+    pub fn at_label(&self, tick: i64) -> &Pose2 {
+        &self.truth[(tick - self.wrong.late_ticks + BEFORE) as usize]
+    }
+
+    fn say(&mut self, robot: u32, body: Body, extension: Vec<u8>) -> EntryId {
+        let sequence = Sequence(self.entries.len() as u64);
+        let id = EntryId { robot: RobotId(robot), boot: BootIndex(0), sequence };
+        self.entries.push(Entry { id, body, extension });
+        id
+    }
+
+    fn extension(&self, tick: i64) -> Vec<u8> {
+        let state = self.trajectory.at(Timestamp(tick * TICK_NS)).expect("kept");
+        state.sensitivity.filter(|_| self.told.is_some()).map_or_else(Vec::new, |of| extension_of_state(&of))
+    }
+}
+
+pub struct Run {
+    pub robots: Vec<Robot>,
+    pub ticks: i64,
+}
+
+pub fn gaussian(random: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(random)
+}
+
+/// What a team may see.
+#[derive(Clone, Copy)]
+pub struct World<'a> {
+    /// The first robot has GPS.
+    pub gps: bool,
+    /// Landmarks that nobody knows the places of.
+    pub landmarks: &'a [[f64; 2]],
+}
+
+impl Default for World<'_> {
+    fn default() -> Self {
+        Self { gps: true, landmarks: &[] }
+    }
+}
+
+/// Robots that wander for `seconds`.
+pub fn run(
+    seed: u64,
+    seconds: i64,
+    config: &FoldConfig,
+    world: World<'_>,
+    robots: &[(Wrong, Option<Calibration>)],
+) -> Run {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let ticks = seconds * 20;
+    let mut run = Run { robots: Vec::new(), ticks };
+    for (index, (wrong, told)) in robots.iter().enumerate() {
+        let mut truth = vec![Pose2::new(3.0 * index as f64, 1.0, 0.5 * index as f64)];
+        let (mut forward, mut rate): (f64, f64) = (0.5, 0.0);
+        let mut steps = Vec::new();
+        for _ in 0..ticks + 2 * BEFORE {
+            // It keeps to the middle, and drives at changing speeds.
+            let home = truth[truth.len() - 1];
+            let wanted = wrap_angle((-home.y_m()).atan2(-home.x_m()) - home.yaw_rad());
+            let pull = if home.position().norm() > 4.0 { 0.3 * wanted } else { 0.0 };
+            rate = (0.95 * rate + 0.12 * gaussian(&mut random) + 0.1 * pull).clamp(-1.0, 1.0);
+            forward = (forward + 0.05 * gaussian(&mut random)).clamp(0.1, 1.0);
+            let noise = NOISE.map(|sigma| sigma * TICK_S.sqrt() * gaussian(&mut random));
+            let said = Vector3::new(forward * TICK_S, 0.0, rate * TICK_S);
+            let [scale, turn, bias] = wrong.motion;
+            let moved = Vector3::new(said.x * (1.0 + scale), 0.0, said.z * (1.0 + turn) - bias * TICK_S);
+            truth.push(home.compose(&Pose2::exp(moved)).compose(&Pose2::exp(Vector3::from(noise))));
+            steps.push(said);
+        }
+        let nominal = NominalTrajectory::new(Timestamp(0), Pose2::identity(), usize::MAX).calibrated();
+        let mut robot =
+            Robot { wrong: *wrong, told: *told, truth, trajectory: nominal, entries: Vec::new() };
+        let first = BEFORE - wrong.late_ticks;
+        for tick in 0..ticks + 1 {
+            let [x, y, yaw] = NOISE.map(|sigma| sigma * sigma * TICK_S);
+            robot.trajectory.extend(&Step {
+                from: Timestamp(tick * TICK_NS),
+                to: Timestamp((tick + 1) * TICK_NS),
+                motion: steps[(tick + first) as usize],
+                covariance: Symmetric3::diagonal(x, y, yaw),
+            });
+        }
+        let boot = Boot {
+            time: Timestamp(0),
+            nonce: 1,
+            configuration: config.hash(),
+            nominal: Pose2::identity(),
+            continuation: None,
+            calibration: None,
+        };
+        let extension = told.map_or_else(Vec::new, |told| extension_of_boot(&told, None));
+        let number = index as u32 + 1;
+        robot.say(number, Body::Boot(boot), extension);
+        let error = PRIOR.map(|sigma| sigma * gaussian(&mut random));
+        let prior = robot.at_label(0).compose(&Pose2::exp(Vector3::from(error)));
+        let prior = Quantity::Absolute(Absolute::Pose(prior));
+        observation(&mut robot, number, 0, prior, &PRIOR);
+        run.robots.push(robot);
+    }
+    for tick in 1..ticks {
+        let observer = random.random_range(0..robots.len());
+        let other = (observer + random.random_range(1..robots.len())) % robots.len();
+        if tick % 4 == 0 {
+            sight(&mut run, observer, other, tick, &mut random);
+        }
+        for (landmark, place) in world.landmarks.iter().enumerate() {
+            // Each robot looks at each now and then, at ticks of its own.
+            for robot in 0..robots.len() {
+                if (tick + 7 * robot as i64 + 3 * landmark as i64) % 20 == 0 {
+                    see_landmark(&mut run, robot, landmark as u32, *place, tick, &mut random);
+                }
+            }
+        }
+        if world.gps && tick % 20 == 0 {
+            let truth = run.robots[0].at_label(tick);
+            let read = [truth.x_m(), truth.y_m()].map(|p| p + GPS * gaussian(&mut random));
+            let gps = Quantity::Absolute(Absolute::Position(read));
+            observation(&mut run.robots[0], 1, tick, gps, &[GPS; 2]);
+        }
+    }
+    run
+}
+
+fn observation(robot: &mut Robot, number: u32, tick: i64, quantity: Quantity, sigmas: &[f64]) -> EntryId {
+    let time = Timestamp(tick * TICK_NS);
+    let observer = robot.trajectory.at(time).expect("kept");
+    let noise = NoiseRef::Explicit(Noise::from_sigmas(sigmas));
+    let extension = robot.extension(tick);
+    robot.say(number, Body::Observation(Observation { time, quantity, noise, observer }), extension)
+}
+
+fn reading(seen: pleiad_estimation::geometry::Vector2, random: &mut ChaCha8Rng) -> Relative {
+    Relative::RangeBearing {
+        range_m: seen.norm() + SIGHTING[0] * gaussian(random),
+        bearing_rad: seen.y.atan2(seen.x) + SIGHTING[1] * gaussian(random),
+    }
+}
+
+const VIEW_M: f64 = 5.0;
+
+fn see_landmark(
+    run: &mut Run,
+    robot: usize,
+    landmark: u32,
+    [x, y]: [f64; 2],
+    tick: i64,
+    random: &mut ChaCha8Rng,
+) {
+    let seen = run.robots[robot].at_label(tick).between(&Pose2::new(x, y, 0.0)).position();
+    if seen.norm() < VIEW_M {
+        let quantity = Quantity::Feature { landmark: LandmarkId(landmark), relative: reading(seen, random) };
+        observation(&mut run.robots[robot], robot as u32 + 1, tick, quantity, &SIGHTING);
+    }
+}
+
+fn sight(run: &mut Run, observer: usize, other: usize, tick: i64, random: &mut ChaCha8Rng) {
+    let [x, y, yaw] = run.robots[observer].wrong.mount;
+    let from = run.robots[observer].at_label(tick).compose(&Pose2::new(x, y, yaw));
+    // Where the other one is at that true instant.
+    let late = run.robots[other].wrong.late_ticks - run.robots[observer].wrong.late_ticks;
+    let seen = from.between(run.robots[other].at_label(tick + late)).position();
+    let relative = reading(seen, random);
+    let quantity = Quantity::Robot { robot: RobotId(other as u32 + 1), relative };
+    let id = observation(&mut run.robots[observer], observer as u32 + 1, tick, quantity, &SIGHTING);
+    let state = run.robots[other].trajectory.at(Timestamp(tick * TICK_NS)).expect("kept");
+    let answer = Answer::State { boot: BootIndex(0), state };
+    let extension = run.robots[other].extension(tick);
+    run.robots[other].say(other as u32 + 1, Body::Half(Half { observation: id, answer }), extension);
+}
+
+impl Run {
+    /// All that was said, by robot.
+    pub fn entries(&self) -> impl Iterator<Item = &Entry> {
+        self.robots.iter().flat_map(|robot| &robot.entries)
+    }
+
+    pub fn ledger(&self, config: FoldConfig) -> Ledger {
+        let mut ledger = Ledger::new(config);
+        for entry in self.entries() {
+            ledger.insert(entry.clone());
+        }
+        ledger
+    }
+
+    /// Errors of position of all robots at the end, by what is published, root mean square in metres.
+    pub fn error_m(&self, joint: &Joint) -> f64 {
+        let square = self.robots.iter().zip(1..).map(|(robot, number)| {
+            let time = Timestamp(self.ticks * TICK_NS);
+            let state = robot.trajectory.at(time).expect("kept");
+            let (pose, _) = joint.estimate(RobotId(number), time, &state).expect("placed");
+            // Published is where the robot is when the time is what its clock shows, not when its clock shows it.
+            let truth = &robot.truth[(self.ticks + BEFORE) as usize];
+            (pose.position() - truth.position()).norm_squared()
+        });
+        (square.sum::<f64>() / self.robots.len() as f64).sqrt()
+    }
+}
