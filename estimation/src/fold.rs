@@ -5,7 +5,8 @@ mod window;
 pub use window::Relinearization;
 pub(crate) use window::fold_blocks;
 
-use crate::fact::{Boot, EntryId, Fingerprint, Noise, NominalState, Quantity};
+use crate::fact::{Absolute, Boot, EntryId, Fingerprint, Noise, NominalState, Quantity};
+use crate::sample::Relative;
 use crate::geometry::{Matrix3, Vector2, Vector3};
 use crate::joint::{ErrorForm, Joint, ParameterKind, Participant, Update, clock_influence};
 use crate::measurement::{self, Linearization, Unusable};
@@ -24,13 +25,47 @@ pub struct FoldConfig {
     pub form: ErrorForm,
     /// Gate by dimension of the measurement, 1 to 3; infinite to accept everything.
     pub gate: [f64; 3],
+    /// Some observations are of nothing; `None` if all are of what they say.
+    pub clutter: Option<Clutter>,
     /// Facts are linearized together; `None` for each where those before it put the robots.
     pub relinearize: Option<Relinearization>,
 }
 
+/// Observations of what is not there: any reading the sensor can give, as likely as any other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clutter {
+    /// Share of observations that are of nothing.
+    pub share: f64,
+    /// How far sensors see, m, and how far from the origin a position fix may be.
+    pub reach_m: f64,
+}
+
+impl Clutter {
+    /// Logarithm of the odds of an observation's being of nothing, by the density of its readings.
+    fn log_odds(&self, quantity: &Quantity) -> f64 {
+        let disc = std::f64::consts::PI * self.reach_m * self.reach_m;
+        let turn = std::f64::consts::TAU;
+        let volume = match quantity {
+            Quantity::Robot { relative, .. }
+            | Quantity::Landmark { relative, .. }
+            | Quantity::Feature { relative, .. } => match relative {
+                Relative::Pose(_) => disc * turn,
+                Relative::Position { .. } => disc,
+                Relative::Range { .. } => self.reach_m,
+                Relative::Bearing { .. } => turn,
+                Relative::RangeBearing { .. } => self.reach_m * turn,
+            },
+            Quantity::Absolute(Absolute::Pose(_)) => disc * turn,
+            Quantity::Absolute(Absolute::Position(_)) => disc,
+            Quantity::Absolute(Absolute::Heading(_)) => turn,
+        };
+        libm::log(self.share / (1.0 - self.share)) - libm::log(volume)
+    }
+}
+
 impl Default for FoldConfig {
     fn default() -> Self {
-        Self { form: ErrorForm::Invariant, gate: DEFAULT_GATE, relinearize: None }
+        Self { form: ErrorForm::Invariant, gate: DEFAULT_GATE, clutter: None, relinearize: None }
     }
 }
 
@@ -47,7 +82,9 @@ impl FoldConfig {
             let lengths = [how.block_ns, how.ahead_ns, how.cell_ns].map(i64::cast_unsigned);
             lengths.into_iter().chain([u64::from(how.passes)])
         });
-        let words = words.chain(together);
+        let clutter = self.clutter.iter().flat_map(|of| [of.share, of.reach_m].map(f64::to_bits));
+        // Told apart from what follows by their number.
+        let words = words.chain(clutter).chain(self.clutter.iter().map(|_| 1)).chain(together);
         let Fingerprint(bytes) = Fingerprint::of_words(words);
         bytes[..8].iter().fold(0, |hash, byte| hash << 8 | u64::from(*byte))
     }
@@ -245,7 +282,8 @@ fn fold_observation(
     }
     let at = linearize(quantity, &poses)?;
     let mut participants = participants(quantity, &taken, &influences, &at);
-    update(joint, config, &at, &noise, &mut participants)
+    let odds = config.clutter.map(|clutter| clutter.log_odds(quantity));
+    update(joint, config, &at, &noise, &mut participants, odds)
 }
 
 /// What besides a robot's own error moves its pose as a measurement sees it: the block, which pose of those in the order of
@@ -386,9 +424,10 @@ fn update(
     at: &Linearization,
     noise: &Matrix3,
     participants: &mut [Participant],
+    odds: Option<f64>,
 ) -> Result<Residual, SkipReason> {
     let threshold = config.gate[at.dimension - 1];
-    let (outcome, nis) = match joint.update(at.dimension, &at.innovation, noise, participants, threshold) {
+    let (outcome, nis) = match joint.update(at.dimension, &at.innovation, noise, participants, threshold, odds) {
         Update::Used { nis } => (Outcome::Used, nis),
         Update::Rejected { nis, threshold } => (Outcome::Rejected { threshold }, nis),
         Update::Indefinite => return Err(SkipReason::Noise),

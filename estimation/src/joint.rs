@@ -6,7 +6,7 @@ mod view;
 
 pub use block::{Block, MappedLandmark, Member, ParameterKind, Parameters};
 pub use covariance::JointCovariance;
-pub(crate) use covariance::Prepared;
+pub(crate) use covariance::{Prepared, squared};
 pub(crate) use view::{RobotView, clock_influence};
 
 use crate::fact::{Boot, Calibration, Continuation, NominalState};
@@ -402,6 +402,7 @@ impl Joint {
         noise: &Matrix3,
         participants: &mut [Participant],
         threshold: f64,
+        clutter: Option<f64>,
     ) -> Update {
         if self.form == ErrorForm::Additive {
             for participant in participants.iter_mut() {
@@ -418,11 +419,33 @@ impl Joint {
             return Update::Rejected { nis, threshold };
         }
         self.updates += 1;
+        if let Some(odds) = clutter {
+            self.update_in_clutter(&prepared, odds);
+            return Update::Used { nis };
+        }
         self.covariance.downdate(&prepared);
         for index in 0..self.blocks.len() {
             self.correct(index, prepared.correction(index));
         }
         Update::Used { nis }
+    }
+
+    /// An update with a measurement that may be of nothing: the mixture of both, with its mean and covariance
+    /// (`barshalom1975`).
+    fn update_in_clutter(&mut self, prepared: &Prepared, odds: f64) {
+        let weight = prepared.weight_in_clutter(odds);
+        self.reduce_in_clutter(prepared, weight);
+        for index in 0..self.blocks.len() {
+            self.correct(index, prepared.correction(index) * weight);
+        }
+    }
+
+    /// The covariance of an update that is of nothing but for a `weight`; the corrections are left.
+    pub(crate) fn reduce_in_clutter(&mut self, prepared: &Prepared, weight: f64) {
+        let deltas: Vec<f64> =
+            (0..self.blocks.len()).flat_map(|index| <[f64; 3]>::from(prepared.correction(index))).collect();
+        self.covariance.downdate(&prepared.scaled(weight.sqrt()));
+        self.covariance.add_outer(&deltas, weight * (1.0 - weight));
     }
 
     /// Takes an error found into what it is the error of.

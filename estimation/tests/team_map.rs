@@ -23,7 +23,7 @@ fn open() -> FoldConfig {
 }
 
 fn team(seed: u64, config: &FoldConfig, gps: bool) -> Run {
-    run(seed, 60, config, World { gps, landmarks: &PLACES }, &[(Wrong::default(), None); 3])
+    run(seed, 60, config, World { gps, landmarks: &PLACES, ..World::default() }, &[(Wrong::default(), None); 3])
 }
 
 /// Error of all places together against their covariance, and how many numbers that is.

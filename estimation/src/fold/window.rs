@@ -12,7 +12,7 @@
 use crate::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, Taken, fold, linearize, taken};
 use crate::geometry::{Matrix3, Vector3};
 use crate::joint::{Block, ErrorForm, Joint, Participant, Prepared};
-use crate::measurement;
+use crate::measurement::{self, Linearization};
 use crate::{Pose2, Timestamp, fact::Quantity};
 
 /// How facts are linearized together.
@@ -47,6 +47,9 @@ impl Relinearization {
     }
 }
 
+/// A measurement that fits nothing keeps so much of its weight, so that its noise is a number.
+const LEAST_WEIGHT: f64 = 1e-9;
+
 /// What is told of every fact that is folded: which, what became of it, and the joint after it.
 pub(crate) type Told<'a> = dyn FnMut(usize, Residual, &dyn Fn() -> Joint) + 'a;
 
@@ -67,7 +70,7 @@ pub(crate) fn fold_blocks(
         let until = |time: Timestamp| from + facts[from..].partition_point(|(key, _)| key.time <= time);
         let (block, seen) = (until(end), until(ahead));
         let mut shifted = |index: usize, residual, now: &dyn Fn() -> Joint| told(from + index, residual, now);
-        fold_window(joint, config, &facts[from..seen], block - from, how.passes, &mut shifted);
+        fold_window(joint, (config, how), &facts[from..seen], block - from, &mut shifted);
         ended(end, joint);
         from = block;
     }
@@ -80,10 +83,9 @@ pub(crate) fn fold_blocks(
 /// additive form, whose error is not the same at another time, every fact is folded alone.
 fn fold_window(
     joint: &mut Joint,
-    config: &FoldConfig,
+    (config, how): (&FoldConfig, &Relinearization),
     facts: &[(FactKey, Fact)],
     count: usize,
-    passes: u32,
     told: &mut Told<'_>,
 ) {
     let mut from = 0;
@@ -95,7 +97,7 @@ fn fold_window(
             let mut shifted =
                 |index: usize, residual, now: &dyn Fn() -> Joint| told(from + index, residual, now);
             let taken = length.min(count - from);
-            fold_stretch(joint, config, &facts[from..from + length], taken, passes, &mut shifted);
+            fold_stretch(joint, (config, how), &facts[from..from + length], taken, &mut shifted);
             from += taken;
         } else {
             let residual = fold(joint, config, key, fact);
@@ -149,20 +151,20 @@ struct Trace {
 
 fn fold_stretch(
     joint: &mut Joint,
-    config: &FoldConfig,
+    (config, how): (&FoldConfig, &Relinearization),
     facts: &[(FactKey, Fact)],
     count: usize,
-    passes: u32,
     told: &mut Told<'_>,
 ) {
     let events: Vec<Result<Event<'_>, SkipReason>> =
         facts.iter().map(|(key, fact)| event(joint, key, fact)).collect();
-    let points = (1..passes).fold(None, |points, _| Some(smoothed(joint, config, &events, points.as_ref())));
+    let points = (1..how.passes)
+        .fold(None, |points, _| Some(smoothed(joint, config, &events, points.as_ref())));
     let mut pass = Pass::new(joint.clone(), points.as_ref());
     for (index, event) in events.iter().enumerate().take(count) {
         let at = points.as_ref().map(|points| points.events[index].as_slice());
         let residual = match event {
-            Ok(event) => pass.take(config, event, at, false).0,
+            Ok(event) => pass.take(config, event, at, true).0,
             Err(reason) => Residual::without_measurement(Outcome::Skipped(*reason)),
         };
         told(index, residual, &|| pass.clone().ended());
@@ -188,7 +190,7 @@ fn smoothed(
     let begun = pass.clone();
     let traces = events.iter().enumerate().map(|(index, event)| {
         let at = points.map(|points| points.events[index].as_slice());
-        event.as_ref().ok().map(|event| pass.take(config, event, at, true).1)
+        event.as_ref().ok().map(|event| pass.take(config, event, at, false).1)
     });
     let traces: Vec<Option<Trace>> = traces.collect();
     let mut adjoint = vec![0.0; joint.covariance().size()];
@@ -256,7 +258,7 @@ impl Pass {
         config: &FoldConfig,
         event: &Event<'_>,
         at: Option<&[Pose2]>,
-        lenient: bool,
+        last: bool,
     ) -> (Residual, Trace) {
         let mut trace =
             Trace { at: Vec::with_capacity(2), couplings: Vec::new(), rows: Vec::with_capacity(2), update: None };
@@ -302,16 +304,37 @@ impl Pass {
         let residual = |outcome, nis| Residual { outcome, dimension, innovation, nis };
         let prepare =
             |noise: &Matrix3| self.joint.covariance().prepare(dimension, &innovation, noise, &participants);
-        let Some(mut prepared) = prepare(&event.noise) else {
+        let weight = match (&config.clutter, at) {
+            (Some(_), Some(_)) => weight(&linearized, &event.noise, threshold),
+            _ => 1.0,
+        };
+        let noise = event.noise / weight;
+        let Some(mut prepared) = prepare(&noise) else {
             return (Residual::without_measurement(Outcome::Skipped(SkipReason::Noise)), trace);
         };
         let nis = prepared.nis();
         if nis > threshold {
-            let softer = prepare(&(event.noise * (nis / threshold))).filter(|_| lenient);
+            let softer = prepare(&(noise * (nis / threshold))).filter(|_| !last && config.clutter.is_none());
             let Some(softer) = softer else {
                 return (residual(Outcome::Rejected { threshold }, nis), trace);
             };
             prepared = softer;
+        }
+        if let Some(clutter) = &config.clutter {
+            let weight = prepared.weight_in_clutter(clutter.log_odds(event.quantity));
+            if last {
+                self.joint.reduce_in_clutter(&prepared, weight);
+                for (index, mean) in self.means.iter_mut().enumerate() {
+                    *mean += prepared.correction(index) * weight;
+                }
+                return (residual(Outcome::Used, nis), trace);
+            }
+            if at.is_none() {
+                match prepare(&(noise / weight.max(LEAST_WEIGHT))) {
+                    Some(softer) => prepared = softer,
+                    None => return (Residual::without_measurement(Outcome::Skipped(SkipReason::Noise)), trace),
+                }
+            }
         }
         self.joint.reduce(&prepared);
         for (index, mean) in self.means.iter_mut().enumerate() {
@@ -328,4 +351,12 @@ impl Pass {
         }
         self.joint
     }
+}
+
+/// Weight of a measurement that may be of nothing, by its distance from a smoothed trajectory: that of the loss of Geman and
+/// McClure (`geman1987`), which hardly grows beyond the gate.
+fn weight(linearized: &Linearization, noise: &Matrix3, threshold: f64) -> f64 {
+    let square = crate::joint::squared(linearized.dimension, &linearized.innovation, noise);
+    let share = threshold / (threshold + square);
+    (share * share).max(LEAST_WEIGHT)
 }

@@ -296,6 +296,7 @@ impl Localizer {
                     noise,
                     &mut observer,
                     f64::INFINITY,
+                    None,
                 );
                 matches!(update, Update::Used { .. }).then_some(Hypothesis { joint, weight })
             }

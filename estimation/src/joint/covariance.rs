@@ -33,6 +33,28 @@ impl Prepared {
         sum
     }
 
+    /// Logarithm of the density of the innovation, `-(NIS + log det(2 pi S)) / 2`.
+    pub(crate) fn log_density(&self) -> f64 {
+        let mut half_log_determinant = 0.0;
+        for k in 0..self.dimension {
+            half_log_determinant += libm::log(self.factor[(k, k)]);
+        }
+        #[allow(clippy::cast_precision_loss, reason = "1, 2 or 3")]
+        let dimension = self.dimension as f64;
+        -0.5 * self.nis() - half_log_determinant - 0.5 * dimension * libm::log(std::f64::consts::TAU)
+    }
+
+    /// Probability that the measurement is not of nothing, by the logarithm of the odds that it is.
+    pub(crate) fn weight_in_clutter(&self, odds: f64) -> f64 {
+        1.0 / (1.0 + libm::exp(odds - self.log_density()))
+    }
+
+    /// With `V` multiplied by a factor.
+    pub(crate) fn scaled(&self, factor: f64) -> Self {
+        let columns = self.columns.each_ref().map(|column| column.iter().map(|entry| entry * factor).collect());
+        Self { columns, ..*self }
+    }
+
     /// `K r` for one robot.
     pub(crate) fn correction(&self, index: usize) -> Vector3 {
         let mut delta = Vector3::zeros();
@@ -178,6 +200,18 @@ impl JointCovariance {
         self.add_diagonal(i, grown);
     }
 
+    /// `P <- P + factor d d^T`.
+    pub(crate) fn add_outer(&mut self, d: &[f64], factor: f64) {
+        let mut start = 0;
+        for row in 0..self.size {
+            let along = d[row] * factor;
+            for (entry, other) in self.lower[start..=start + row].iter_mut().zip(d) {
+                *entry += along * other;
+            }
+            start += row + 1;
+        }
+    }
+
     /// Prepares an update; `None` if the innovation covariance is not positive definite.
     pub(crate) fn prepare(
         &self,
@@ -274,6 +308,22 @@ impl JointCovariance {
             }
         }
     }
+}
+
+/// `r^T S^-1 r` of the leading `dimension` rows; infinite if `S`, given by its lower triangle, is not positive definite.
+pub(crate) fn squared(dimension: usize, r: &Vector3, s: &Matrix3) -> f64 {
+    let Some(l) = cholesky(dimension, s) else { return f64::INFINITY };
+    let mut whitened = Vector3::zeros();
+    let mut square = 0.0;
+    for row in 0..dimension {
+        let mut sum = r[row];
+        for k in 0..row {
+            sum -= l[(row, k)] * whitened[k];
+        }
+        whitened[row] = sum / l[(row, row)];
+        square += whitened[row] * whitened[row];
+    }
+    square
 }
 
 /// Lower Cholesky factor of the leading `dimension` rows of a symmetric matrix given by its lower triangle.

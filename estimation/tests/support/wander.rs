@@ -81,11 +81,17 @@ pub struct World<'a> {
     pub gps: bool,
     /// Landmarks that nobody knows the places of.
     pub landmarks: &'a [[f64; 2]],
+    /// Share of sightings of robots that are of nothing: any range and any bearing.
+    pub garbage: f64,
+    /// Noise of the odometry, over [`NOISE`].
+    pub slip: f64,
+    /// Ticks between sightings of robots.
+    pub every: i64,
 }
 
 impl Default for World<'_> {
     fn default() -> Self {
-        Self { gps: true, landmarks: &[] }
+        Self { gps: true, landmarks: &[], garbage: 0.0, slip: 1.0, every: 4 }
     }
 }
 
@@ -111,7 +117,7 @@ pub fn run(
             let pull = if home.position().norm() > 4.0 { 0.3 * wanted } else { 0.0 };
             rate = (0.95 * rate + 0.12 * gaussian(&mut random) + 0.1 * pull).clamp(-1.0, 1.0);
             forward = (forward + 0.05 * gaussian(&mut random)).clamp(0.1, 1.0);
-            let noise = NOISE.map(|sigma| sigma * TICK_S.sqrt() * gaussian(&mut random));
+            let noise = NOISE.map(|sigma| world.slip * sigma * TICK_S.sqrt() * gaussian(&mut random));
             let said = Vector3::new(forward * TICK_S, 0.0, rate * TICK_S);
             let [scale, turn, bias] = wrong.motion;
             let moved = Vector3::new(said.x * (1.0 + scale), 0.0, said.z * (1.0 + turn) - bias * TICK_S);
@@ -123,7 +129,7 @@ pub fn run(
             Robot { wrong: *wrong, told: *told, truth, trajectory: nominal, entries: Vec::new() };
         let first = BEFORE - wrong.late_ticks;
         for tick in 0..ticks + 1 {
-            let [x, y, yaw] = NOISE.map(|sigma| sigma * sigma * TICK_S);
+            let [x, y, yaw] = NOISE.map(|sigma| (world.slip * sigma).powi(2) * TICK_S);
             robot.trajectory.extend(&Step {
                 from: Timestamp(tick * TICK_NS),
                 to: Timestamp((tick + 1) * TICK_NS),
@@ -151,8 +157,8 @@ pub fn run(
     for tick in 1..ticks {
         let observer = random.random_range(0..robots.len());
         let other = (observer + random.random_range(1..robots.len())) % robots.len();
-        if tick % 4 == 0 {
-            sight(&mut run, observer, other, tick, &mut random);
+        if tick % world.every == 0 {
+            sight(&mut run, observer, other, tick, world.garbage, &mut random);
         }
         for (landmark, place) in world.landmarks.iter().enumerate() {
             // Each robot looks at each now and then, at ticks of its own.
@@ -204,13 +210,25 @@ fn see_landmark(
     }
 }
 
-fn sight(run: &mut Run, observer: usize, other: usize, tick: i64, random: &mut ChaCha8Rng) {
+fn sight(
+    run: &mut Run,
+    observer: usize,
+    other: usize,
+    tick: i64,
+    garbage: f64,
+    random: &mut ChaCha8Rng,
+) {
     let [x, y, yaw] = run.robots[observer].wrong.mount;
     let from = run.robots[observer].at_label(tick).compose(&Pose2::new(x, y, yaw));
     // Where the other one is at that true instant.
     let late = run.robots[other].wrong.late_ticks - run.robots[observer].wrong.late_ticks;
     let seen = from.between(run.robots[other].at_label(tick + late)).position();
-    let relative = reading(seen, random);
+    let mut relative = reading(seen, random);
+    let (luck, range_m, bearing_rad) =
+        (random.random::<f64>(), random.random_range(0.3..8.0), random.random_range(-3.1..3.1));
+    if luck < garbage {
+        relative = Relative::RangeBearing { range_m, bearing_rad };
+    }
     let quantity = Quantity::Robot { robot: RobotId(other as u32 + 1), relative };
     let id = observation(&mut run.robots[observer], observer as u32 + 1, tick, quantity, &SIGHTING);
     let state = run.robots[other].trajectory.at(Timestamp(tick * TICK_NS)).expect("kept");
