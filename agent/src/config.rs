@@ -1,5 +1,6 @@
 //! Configuration of an agent: what `pleiad agent --config FILE` reads. `docs/agent.md` lists every key.
 
+mod calibration;
 mod checks;
 mod model;
 mod sections;
@@ -9,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use pleiad_bus::{FaultPlan, FaultsError};
-use pleiad_estimation::fact::{ClockMap, Noise};
+use pleiad_estimation::fact::{Calibration, ClockMap, Noise};
 use pleiad_estimation::fold::FoldConfig;
 use pleiad_estimation::ledger::Closure;
 use pleiad_estimation::motion::MotionModel;
@@ -19,12 +20,13 @@ use pleiad_protocol::TeamName;
 use pleiad_recording::RecordingError;
 use serde::{Deserialize, Serialize};
 
+pub use calibration::{CalibrationSection, ClutterSection};
 use checks::{finite, not_negative, positive, value};
 pub use model::RobotCorrection;
 pub use sections::{
     AngleNoise, BusMode, BusSection, ClockSection, ErrorName, FaultsSection, FilterSection, LandmarkRow,
     LedgerSection, LengthNoise, MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise,
-    RelinearizeSection, SensorsSection, VelocityName, YawName,
+    RelinearizeSection, SensorsSection, UnknownLandmarks, VelocityName, YawName,
 };
 
 /// Why a configuration cannot be used.
@@ -107,6 +109,9 @@ pub struct AgentConfig {
     /// Sensor noises; readings of a kind that is not listed are refused.
     #[serde(default)]
     pub sensors: SensorsSection,
+    /// What is not sure about the robot and is to be found out; without it nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationSection>,
     /// Local clock to team time.
     #[serde(default)]
     pub clock: ClockSection,
@@ -161,6 +166,8 @@ pub struct NodeConfig {
     pub history_samples: usize,
     /// Noise by kind of measurement.
     pub sensors: SensorsSection,
+    /// What is not sure about the robot; some even if all of it is sure, where the team calibrates clocks.
+    pub calibration: Option<Calibration>,
     /// Clock map.
     pub clock: ClockMap,
     /// The map.
@@ -255,6 +262,10 @@ impl AgentConfig {
             }
         }
         self.check_relinearization()?;
+        self.check_clutter()?;
+        if self.sensors.unknown_landmarks == UnknownLandmarks::Map {
+            self.needs_facts("sensors.unknown_landmarks = \"map\"")?;
+        }
         positive("motion.longest_gap_s", motion.longest_gap_s)?;
         positive("motion.speed_limit_m_s", motion.speed_limit_m_s)?;
         positive("motion.yaw_rate_limit_rad_s", motion.yaw_rate_limit_rad_s)?;
@@ -282,6 +293,7 @@ impl AgentConfig {
             motion_limits: [motion.speed_limit_m_s, motion.speed_limit_m_s, motion.yaw_rate_limit_rad_s],
             history_samples: motion.history_samples,
             sensors,
+            calibration: self.calibration()?,
             clock: self.clock.checked()?,
             landmarks: self.map()?,
             estimate_rate_hz: self.output.estimate_rate_hz,

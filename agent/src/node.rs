@@ -20,7 +20,9 @@ pub use views::SettledEstimate;
 
 use closing::Membership;
 use corrector::Corrector;
-use pleiad_estimation::fact::{Answer, Body, Entry, EntryId, Half, LogId, NoiseRef, Observation, VoidReason};
+use pleiad_estimation::fact::{
+    Answer, Body, Entry, EntryId, Half, LogId, NoiseRef, Observation, VoidReason, extension_of_state,
+};
 use pleiad_estimation::ledger::{Insertion, Ledger, Refusal};
 use pleiad_estimation::motion::DeadReckoning;
 use pleiad_estimation::nominal::Outside;
@@ -96,8 +98,8 @@ impl Node {
                 .correction
                 .as_ref()
                 .map(|correction| Corrector::new(config.robot, correction, config.fold)),
+            segments: Segments::new(config.calibration.is_some()),
             config,
-            segments: Segments::default(),
             nonce,
             boot: None,
             waiting: VecDeque::new(),
@@ -313,10 +315,21 @@ impl Node {
 
     /// Says something in this robot's own log.
     fn say(&mut self, boot: BootIndex, body: Body) {
+        // How a state depends on what is calibrated goes beside it.
+        let state = match &body {
+            Body::Observation(observation) => observation.observer.sensitivity,
+            Body::Half(Half { answer: Answer::State { state, .. }, .. }) => state.sensitivity,
+            _ => None,
+        };
+        let extension = state.map_or_else(Vec::new, |sensitivity| extension_of_state(&sensitivity));
+        self.say_more(boot, body, extension);
+    }
+
+    fn say_more(&mut self, boot: BootIndex, body: Body, extension: Vec<u8>) {
         let log = LogId { robot: self.config.robot, boot };
         let sequence = Sequence(self.ledger.log(log).map_or(0, pleiad_estimation::ledger::Log::held));
         let id = EntryId { robot: log.robot, boot, sequence };
-        let entry = Entry { id, body, extension: Vec::new() };
+        let entry = Entry { id, body, extension };
         // The own log has no gap and no second author: this always extends it.
         self.ledger.insert(entry.clone());
         self.hear(&entry);

@@ -1,5 +1,6 @@
 //! What an agent leaves behind: its trajectories, online and settled, and a summary.
 
+mod found;
 mod trajectories;
 
 use std::fmt::Write as _;
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::approximate::Approximate;
 use crate::node::{Node, SettledEstimate};
 
+pub use found::{Found, FoundLandmark, FoundParameter};
 pub(crate) use trajectories::Trajectories;
 
 /// First line of the files of estimates.
@@ -91,6 +93,9 @@ pub struct AgentSummary {
     pub distance_m: f64,
     /// Boots of this robot known at the end.
     pub boots: u32,
+    /// What was found out besides poses.
+    #[serde(default)]
+    pub found: Found,
 }
 
 /// The online view of an estimate in the form of a settled one.
@@ -108,7 +113,9 @@ pub fn online(estimate: &Estimate) -> SettledEstimate {
 pub fn summary(node: &mut Node, messages: u64, bytes: u64) -> AgentSummary {
     let status = node.status();
     let refused = node.refusals().map(|(reason, count)| (reason.to_owned(), count)).collect();
-    AgentSummary { distance_m: node.distance_m(), samples_refused: refused, messages, bytes, ..of(&status) }
+    let found = node.found();
+    let distance_m = node.distance_m();
+    AgentSummary { distance_m, samples_refused: refused, messages, bytes, found, ..of(&status) }
 }
 
 /// The same from a robot of an approximate strategy; the estimate is its own alone.

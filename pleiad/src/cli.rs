@@ -17,7 +17,7 @@ pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
 pub use evaluate::{EvaluateArgs, VariantArg, VariantFilter};
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
-pub use values::{AbsoluteArg, LandmarksArg, RelinearizeArg};
+pub use values::{AbsoluteArg, CalibrateArg, ClutterArg, LandmarksArg, RelinearizeArg};
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
 #[derive(Debug, Parser)]
@@ -115,6 +115,13 @@ pub struct RunArgs {
     /// Linearize facts together: blocks of so many seconds, smoothed so far beyond, in so many passes, as in 5:5:4.
     #[arg(long, value_name = "BLOCK_S:AHEAD_S:PASSES")]
     pub relinearize: Option<RelinearizeArg>,
+    /// So large a share of observations is of nothing, seen up to so far away: each is weighed by its probability.
+    #[arg(long, value_name = "SHARE:REACH_M")]
+    pub clutter: Option<ClutterArg>,
+    /// What is not sure about the robots and is to be found out, by standard deviations: forward and yaw (scales of the odometry),
+    /// bias (yaw rate, rad/s), mount_m and mount_rad (the sensor of others), clock (s) and drift_ppm.
+    #[arg(long, value_name = "NAME=SIGMA,...")]
+    pub calibrate: Option<CalibrateArg>,
     /// A file of fault tables: what goes wrong between the robots and with their processes (docs/faults.md);
     /// those of the scenario itself if absent.
     #[arg(long, value_name = "FILE")]
@@ -145,7 +152,14 @@ pub struct ReplayArgs {
     /// Linearize facts together: blocks of so many seconds, smoothed so far beyond, in so many passes, as in 5:5:4.
     #[arg(long, value_name = "BLOCK_S:AHEAD_S:PASSES")]
     pub relinearize: Option<RelinearizeArg>,
-    /// Which landmarks the robots know: known, none, or numbers as in 6,7.
+    /// So large a share of observations is of nothing, seen up to so far away: each is weighed by its probability.
+    #[arg(long, value_name = "SHARE:REACH_M")]
+    pub clutter: Option<ClutterArg>,
+    /// What is not sure about the robots and is to be found out, by standard deviations: forward and yaw (scales of the odometry),
+    /// bias (yaw rate, rad/s), mount_m and mount_rad (the sensor of others), clock (s) and drift_ppm.
+    #[arg(long, value_name = "NAME=SIGMA,...")]
+    pub calibrate: Option<CalibrateArg>,
+    /// Which landmarks the robots know: known, none, numbers as in 6,7, or team: none, and the team maps them.
     #[arg(long, default_value = "known")]
     pub landmarks: LandmarksArg,
     /// Position fixes made from ground truth, as in 1@1.0:0.3 (robot 1, 1 Hz, sigma 0.3 m). Repeatable.

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use pleiad_agent::config::{
-    AgentConfig, AngleNoise, BusSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LedgerSection,
+    AgentConfig, AngleNoise, BusSection, CalibrationSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LedgerSection,
     LengthNoise, MotionSection, OutputSection, PriorSection, RangeBearingNoise, RobotCorrection,
-    SensorsSection,
+    SensorsSection, UnknownLandmarks,
 };
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::strategy::StrategyKind;
@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 pub use beside::{MODEL, copy_model, write_beside};
 use beside::{model_for, priors_beside};
 
-use crate::cli::{AbsoluteArg, ErrorArg, LandmarksArg, RelinearizeArg};
+use crate::cli::{AbsoluteArg, CalibrateArg, ClutterArg, ErrorArg, LandmarksArg, RelinearizeArg};
 
 /// Truth is interpolated across holes up to this long.
 pub const TRUTH_GAP_S: f64 = 0.3;
@@ -46,6 +46,9 @@ pub struct NoiseFile {
     pub motion: MotionSection,
     /// As in an agent's configuration.
     pub sensors: SensorsSection,
+    /// As in an agent's configuration.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationSection>,
 }
 
 /// The recording in a run folder, or the folder itself.
@@ -85,6 +88,15 @@ pub struct FilterArgs {
     pub strategy: StrategyKind,
     pub error: ErrorArg,
     pub relinearize: Option<RelinearizeArg>,
+    pub clutter: Option<ClutterArg>,
+    pub calibrate: Option<CalibrateArg>,
+}
+
+impl FilterArgs {
+    /// The exact strategy as it comes.
+    pub fn exact(error: ErrorArg) -> Self {
+        Self { strategy: StrategyKind::Exact, error, relinearize: None, clutter: None, calibrate: None }
+    }
 }
 
 impl FilterArgs {
@@ -94,7 +106,8 @@ impl FilterArgs {
             ErrorArg::Additive => ErrorName::Additive,
         };
         let relinearize = self.relinearize.map(|how| how.0).or(filter.relinearize);
-        FilterSection { error, gate: filter.gate, relinearize }
+        let clutter = self.clutter.map(|clutter| clutter.0).or(filter.clutter);
+        FilterSection { error, gate: filter.gate, clutter, relinearize }
     }
 }
 
@@ -113,6 +126,7 @@ fn configuration(
         prior: None,
         motion: noise.motion.clone(),
         sensors: noise.sensors.clone(),
+        calibration: filter.calibrate.map(|given| given.0).or(noise.calibration),
         clock: ClockSection::default(),
         landmarks: landmarks.to_vec(),
         bus: BusSection::default(),
@@ -143,7 +157,7 @@ pub fn simulated(scenario: &Scenario, run: SimulatedRun, filter: FilterArgs) -> 
 /// What a simulated robot's agent has to know: the noises the world was made with.
 pub fn noise_of(settings: &RobotSettings) -> NoiseFile {
     let (motion, sensors) = (agents::motion(settings), agents::sensors(settings));
-    NoiseFile { filter: FilterSection::default(), motion, sensors }
+    NoiseFile { motion, sensors, ..NoiseFile::default() }
 }
 
 /// How a recording is to be replayed.
@@ -191,6 +205,7 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
     recording = match options.landmarks {
         LandmarksArg::Known => recording,
         LandmarksArg::None => recording.with_landmarks(&BTreeSet::new()),
+        LandmarksArg::Team => recording,
         LandmarksArg::Only(ids) => {
             if let Some(unknown) = ids.iter().find(|id| !recording.landmarks.contains_key(id)) {
                 let known: Vec<_> = recording.landmarks.keys().map(ToString::to_string).collect();
@@ -202,13 +217,17 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
     let mut notes = Vec::new();
     let model = model_for(options.model, options.folder)?;
     add_fixes(&mut recording, options, (start, end))?;
-    let landmarks = map(&recording);
+    let unknown = *options.landmarks == LandmarksArg::Team;
+    let landmarks = if unknown { Vec::new() } else { map(&recording) };
     let mut agents = BTreeMap::new();
     let mut samples = BTreeMap::new();
     for (robot, channels) in &recording.robots {
         let noise = noise_for(*robot, &recording, options)?;
         let mut agent = configuration(*robot, &noise, options.filter, &landmarks);
         agent.model.clone_from(&model);
+        if unknown {
+            agent.sensors.unknown_landmarks = UnknownLandmarks::Map;
+        }
         let correction = agent.correction()?;
         for remark in correction.iter().flat_map(|correction| &correction.remarks) {
             // Much the same for every robot of a team.
@@ -323,7 +342,6 @@ fn noise_for(robot: RobotId, recording: &Recording, options: &ReplayOptions) -> 
     };
     let positive = |sigma_m: f64| (sigma_m > 0.0).then_some(LengthNoise { sigma_m });
     Ok(NoiseFile {
-        filter: FilterSection::default(),
         motion: MotionSection {
             wheel_radius_m,
             track_width_m,
@@ -346,6 +364,7 @@ fn noise_for(robot: RobotId, recording: &Recording, options: &ReplayOptions) -> 
                 .then_some(AngleNoise { sigma_rad: noise.heading_sigma_rad }),
             ..SensorsSection::default()
         },
+        ..NoiseFile::default()
     })
 }
 

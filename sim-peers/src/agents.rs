@@ -101,6 +101,7 @@ pub fn nodes(
             prior: run.priors.get(robot).map(prior),
             motion: motion(settings),
             sensors: sensors(settings),
+            calibration: None,
             clock: ClockSection::default(),
             landmarks: landmarks.clone(),
             bus: BusSection::default(),

@@ -137,6 +137,7 @@ impl Stage {
             prior: self.run.priors.get(&robot).map(agents::prior),
             motion: agents::motion(settings),
             sensors: agents::sensors(settings),
+            calibration: None,
             clock: ClockSection::default(),
             landmarks: Vec::new(),
             bus,

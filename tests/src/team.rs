@@ -99,6 +99,7 @@ impl Team {
                 prior: world.priors.get(robot).map(agents::prior),
                 motion: agents::motion(&told_as(settings, told.noise)),
                 sensors: agents::sensors(&told_as(settings, told.noise)),
+                calibration: None,
                 clock: ClockSection::default(),
                 landmarks: landmarks.clone(),
                 bus: BusSection::default(),
@@ -231,7 +232,7 @@ impl TeamRun {
     /// As [`TeamRun::joint_error_at`].
     pub fn pose_error_at(&self, joint: &Joint, robot: RobotId, time: Timestamp) -> PoseError {
         let state = self.reckoned[&robot].trajectory.at(time).expect("odometry");
-        let (estimate, published) = joint.estimate(robot, &state).expect("a place in the map");
+        let (estimate, published) = joint.estimate(robot, time, &state).expect("a place in the map");
         let truth = self.team.world.tracks[&robot].pose_at(time);
         let back = estimate.invariant_from_additive();
         let published = published.to_matrix();

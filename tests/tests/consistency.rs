@@ -186,8 +186,8 @@ fn the_fold_is_the_filter_that_steps_every_tick_to_a_percent_of_a_sigma() {
         let ekf = per_tick(run, ErrorForm::Invariant);
         let joint = run.joint_at(run.team.end());
         for robot in run.outcomes.keys() {
-            let (_, state) = run.reckoned(*robot).trajectory.end();
-            let (pose, covariance) = joint.estimate(*robot, &state).unwrap();
+            let (end, state) = run.reckoned(*robot).trajectory.end();
+            let (pose, covariance) = joint.estimate(*robot, end, &state).unwrap();
             let reference = ekf.pose(*robot).unwrap();
             let m = reference.additive_from_invariant();
             let expected = m * ekf.covariance().block(*robot, *robot).unwrap() * m.transpose();

@@ -47,12 +47,12 @@ fn factored_is_the_centralized_additive_filter_over_a_whole_run() {
             FoldConfig { form: ErrorForm::Additive, gate: [f64::INFINITY; 3], ..FoldConfig::default() };
         let joint = exact.joint_in(config, team.end());
         for (robot, (_, view)) in &factored.last.views {
-            let (_, state) = exact.reckoned(*robot).trajectory.end();
+            let (end, state) = exact.reckoned(*robot).trajectory.end();
             let expected = oracle.robot(*robot).unwrap().correction.compose(&state.nominal);
             let offset = view.pose.position() - expected.position();
             let turned = wrap_angle(view.pose.yaw_rad() - expected.yaw_rad());
             assert!(offset.norm() < 1e-9 && turned.abs() < 1e-9, "robot {robot}: {offset} {turned}");
-            let (_, covariance) = joint.estimate(*robot, &state).unwrap();
+            let (_, covariance) = joint.estimate(*robot, end, &state).unwrap();
             let apart = (view.covariance - covariance.to_matrix()).amax();
             assert!(apart < 1e-9, "robot {robot}: {apart}");
         }

@@ -7,6 +7,8 @@ use pleiad_estimation::fold::{DEFAULT_GATE, FoldConfig, Relinearization};
 use pleiad_estimation::joint::ErrorForm;
 use serde::{Deserialize, Serialize};
 
+use super::calibration::ClutterSection;
+
 /// The error of a pose, as written in a configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -26,6 +28,9 @@ pub struct FilterSection {
     pub error: ErrorName,
     /// Gate on the normalized innovation squared for measurements of dimension 1, 2, 3.
     pub gate: [f64; 3],
+    /// Some observations are of nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clutter: Option<ClutterSection>,
     /// Facts are linearized together, not each where those before it put the robots.
     pub relinearize: Option<RelinearizeSection>,
 }
@@ -50,7 +55,7 @@ impl Default for RelinearizeSection {
 
 impl Default for FilterSection {
     fn default() -> Self {
-        Self { error: ErrorName::Invariant, gate: DEFAULT_GATE, relinearize: None }
+        Self { error: ErrorName::Invariant, gate: DEFAULT_GATE, clutter: None, relinearize: None }
     }
 }
 
@@ -68,7 +73,7 @@ impl FilterSection {
             passes: how.passes,
             cell_ns: cell_s.map_or(0, ns),
         });
-        FoldConfig { form, gate: self.gate, relinearize }
+        FoldConfig { form, gate: self.gate, clutter: self.clutter.map(Into::into), relinearize }
     }
 }
 
@@ -203,6 +208,19 @@ pub struct SensorsSection {
     /// Absolute heading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heading: Option<AngleNoise>,
+    /// What becomes of sightings of landmarks that `[[landmarks]]` does not list.
+    pub unknown_landmarks: UnknownLandmarks,
+}
+
+/// What becomes of sightings of landmarks whose place the robot does not know.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UnknownLandmarks {
+    /// They are refused, and counted.
+    #[default]
+    Refuse,
+    /// The team finds out their places.
+    Map,
 }
 
 /// Noise of a pose.

@@ -1,6 +1,8 @@
 //! How a boot begins.
 
-use pleiad_estimation::fact::{Absolute, Body, Boot, Continuation, NoiseRef, Observation, Profile, Quantity};
+use pleiad_estimation::fact::{
+    Absolute, Body, Boot, Continuation, NoiseRef, Observation, Profile, Quantity, extension_of_boot,
+};
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, Pose2, Timestamp};
 
@@ -49,7 +51,12 @@ impl Node {
         self.keep_tick();
         let nonce = self.nonce.wrapping_add(u64::from(index.0));
         let configuration = self.ledger.configuration();
-        self.say(index, Body::Boot(Boot { time, nonce, configuration, nominal, continuation, calibration: None }));
+        let uncertain = self.config.calibration.filter(|calibration| !calibration.is_none());
+        let last = continuation.and_then(|from| from.last.sensitivity);
+        let extension =
+            uncertain.map_or_else(Vec::new, |calibration| extension_of_boot(&calibration, last.as_ref()));
+        let boot = Boot { time, nonce, configuration, nominal, continuation, calibration: None };
+        self.say_more(index, Body::Boot(boot), extension);
         self.say(index, Body::ClockMap(self.config.clock));
         for (profile, noise) in (0u16..).zip(self.config.sensors.profiles()) {
             if let Some(noise) = noise {

@@ -6,7 +6,7 @@ use pleiad_estimation::motion::OdometryRefusal;
 use pleiad_estimation::sample::{Reading, Relative, Sample, SampleRefusal, Target};
 
 use super::{Command, MOST_WAITING, Node, Notice, Record};
-use crate::config::SensorsSection;
+use crate::config::{SensorsSection, UnknownLandmarks};
 
 impl Node {
     pub(super) fn sample(&mut self, sample: Sample) {
@@ -137,9 +137,16 @@ impl Node {
                         if matches!(relative, Relative::Pose(_)) {
                             return Err(SampleRefusal::LandmarkPose(landmark));
                         }
-                        let position_m = self.config.landmarks.get(&landmark).copied();
-                        let position_m = position_m.ok_or(SampleRefusal::UnknownLandmark(landmark))?;
-                        Ok((Quantity::Landmark { landmark, position_m, relative }, profile))
+                        let quantity = match self.config.landmarks.get(&landmark) {
+                            Some(position_m) => {
+                                Quantity::Landmark { landmark, position_m: *position_m, relative }
+                            }
+                            None if self.config.sensors.unknown_landmarks == UnknownLandmarks::Map => {
+                                Quantity::Feature { landmark, relative }
+                            }
+                            None => return Err(SampleRefusal::UnknownLandmark(landmark)),
+                        };
+                        Ok((quantity, profile))
                     }
                 }
             }

@@ -8,6 +8,8 @@ use pleiad_estimation::{BootIndex, Pose2, Timestamp};
 #[derive(Debug, Default)]
 pub(super) struct Segments {
     all: Vec<Segment>,
+    /// Trajectories keep how they depend on what is calibrated.
+    calibrated: bool,
     /// Path length of the boots forgotten, m.
     forgotten_m: f64,
 }
@@ -21,6 +23,10 @@ pub(super) struct Segment {
 }
 
 impl Segments {
+    pub(super) fn new(calibrated: bool) -> Self {
+        Self { calibrated, ..Self::default() }
+    }
+
     pub(super) fn begin(
         &mut self,
         boot: BootIndex,
@@ -29,7 +35,9 @@ impl Segments {
         odom: Pose2,
         horizon: usize,
     ) {
-        self.all.push(Segment { boot, trajectory: NominalTrajectory::new(time, nominal, horizon), odom });
+        let trajectory = NominalTrajectory::new(time, nominal, horizon);
+        let trajectory = if self.calibrated { trajectory.calibrated() } else { trajectory };
+        self.all.push(Segment { boot, trajectory, odom });
     }
 
     /// Goes on, or begins, with a state from the journal.

@@ -9,6 +9,7 @@ use pleiad_protocol::{Estimate, LogStatus, SampleCounts, Status};
 
 use super::Node;
 use super::segments::Segment;
+use crate::results::Found;
 
 /// One point of a settled trajectory: the estimate at a time on all facts up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,10 +33,10 @@ impl Node {
         let (boot, trajectory) = self.segments.last()?;
         let (time, state) = trajectory.end();
         let joint = self.ledger.settle();
-        let member = joint.member(self.config.robot).filter(|member| member.boot == boot)?;
+        joint.member(self.config.robot).filter(|member| member.boot == boot)?;
         let odom = self.segments.odom();
-        let map_from_odom = member.correction.compose(&odom.inverse());
-        let (map_from_robot, covariance) = joint.estimate(self.config.robot, &state)?;
+        let map_from_odom = joint.correction_at(self.config.robot, time, &state)?.compose(&odom.inverse());
+        let (map_from_robot, covariance) = joint.estimate(self.config.robot, time, &state)?;
         let [xx, _, yy, _, _, yaw] = covariance.0;
         Some(Estimate {
             robot: self.config.robot,
@@ -83,7 +84,7 @@ impl Node {
                         time,
                         *boot,
                         odom.compose(&state.nominal),
-                        point.estimate(&state),
+                        point.estimate(time, &state),
                     ));
                 }
             }
@@ -140,6 +141,11 @@ impl Node {
     /// Why the sample refused last was refused. Notices are given for the first of a reason only.
     pub fn last_refusal(&self) -> Option<SampleRefusal> {
         self.counts.last
+    }
+
+    /// What was found out besides poses.
+    pub fn found(&mut self) -> Found {
+        Found::of(self.ledger.settle())
     }
 
     /// Distance travelled by dead reckoning, m.

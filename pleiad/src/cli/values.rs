@@ -2,14 +2,16 @@
 
 use std::str::FromStr;
 
-use pleiad_agent::config::RelinearizeSection;
+use pleiad_agent::config::{CalibrationSection, ClutterSection, RelinearizeSection};
 use pleiad_estimation::{LandmarkId, RobotId};
 
-/// `known`, `none`, or a list of numbers.
+/// `known`, `none`, `team`, or a list of numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LandmarksArg {
     Known,
     None,
+    /// Nobody knows where they are; the team finds out.
+    Team,
     Only(Vec<LandmarkId>),
 }
 
@@ -20,12 +22,13 @@ impl FromStr for LandmarksArg {
         match text {
             "known" => Ok(Self::Known),
             "none" => Ok(Self::None),
+            "team" => Ok(Self::Team),
             list => list
                 .split(',')
                 .map(|id| id.trim().parse().map(LandmarkId))
                 .collect::<Result<_, _>>()
                 .map(Self::Only)
-                .map_err(|_| format!("found {text:?}, expected known, none, or numbers as in 6,7")),
+                .map_err(|_| format!("found {text:?}, expected known, none, team, or numbers as in 6,7")),
         }
     }
 }
@@ -46,6 +49,54 @@ impl FromStr for RelinearizeArg {
             whole.then_some(Self(RelinearizeSection { block_s, ahead_s, passes: passes.parse().ok()? }))
         };
         parsed().ok_or_else(|| format!("found {text:?}, expected BLOCK_S:AHEAD_S:PASSES as in 5:5:4"))
+    }
+}
+
+/// `SHARE:REACH_M`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClutterArg(pub ClutterSection);
+
+impl FromStr for ClutterArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parsed = text.split_once(':').and_then(|(share, reach)| {
+            Some(Self(ClutterSection { share: share.parse().ok()?, reach_m: reach.parse().ok()? }))
+        });
+        parsed.ok_or_else(|| format!("found {text:?}, expected SHARE:REACH_M as in 0.05:10"))
+    }
+}
+
+/// `NAME=SIGMA,...`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CalibrateArg(pub CalibrationSection);
+
+impl FromStr for CalibrateArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut section = CalibrationSection::default();
+        for part in text.split(',') {
+            let wrong = || {
+                format!(
+                    "found {part:?}, expected forward, yaw, bias, mount_m, mount_rad, clock or drift_ppm with a sigma, \
+                     as in forward=0.05,clock=0.1"
+                )
+            };
+            let (name, sigma) = part.split_once('=').ok_or_else(wrong)?;
+            let slot = match name {
+                "forward" => &mut section.sigma_forward_scale,
+                "yaw" => &mut section.sigma_yaw_scale,
+                "bias" => &mut section.sigma_yaw_rate_bias_rad_s,
+                "mount_m" => &mut section.sigma_mount_m,
+                "mount_rad" => &mut section.sigma_mount_rad,
+                "clock" => &mut section.sigma_clock_offset_s,
+                "drift_ppm" => &mut section.sigma_clock_drift_ppm,
+                _ => return Err(wrong()),
+            };
+            *slot = sigma.parse().map_err(|_| wrong())?;
+        }
+        Ok(Self(section))
     }
 }
 

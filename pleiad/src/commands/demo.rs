@@ -6,7 +6,6 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use pleiad_estimation::RobotId;
-use pleiad_estimation::strategy::StrategyKind;
 use pleiad_report::{DemoCase, DemoReport, demo_report, write_summary};
 use pleiad_sim_peers::{Scenario, connectivity, simulate};
 use serde::Serialize;
@@ -112,7 +111,7 @@ fn run_case(args: &DemoArgs, name: &str, text: &str, out: &Path) -> anyhow::Resu
         .with_context(|| format!("cannot write {}", path.display()))?;
     let scenario = Scenario::load(&path)?;
     let world = simulate(&scenario, args.seed)?;
-    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant, relinearize: None };
+    let filter = FilterArgs::exact(ErrorArg::Invariant);
     let mut team = setup::simulated(&scenario, world, filter);
     team.notes.extend(cut_off(&team));
     let options = ProcessOptions {

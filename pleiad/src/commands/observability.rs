@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use anyhow::{Context, bail};
 use pleiad_estimation::RobotId;
 use pleiad_estimation::observability::{Observability, of_entries};
-use pleiad_estimation::strategy::StrategyKind;
 use pleiad_recording::ReadOptions;
 use pleiad_sim_peers::{Scenario, connectivity, simulate};
 use serde::Serialize;
@@ -49,7 +48,7 @@ pub fn of_run(result: &RunResult) -> anyhow::Result<Observability> {
 }
 
 pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
-    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant, relinearize: None };
+    let filter = FilterArgs::exact(ErrorArg::Invariant);
     let team = if args.input.is_dir() {
         if args.seed.is_some() {
             bail!("--seed: a recording has none; it is for scenarios");

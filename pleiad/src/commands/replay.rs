@@ -5,8 +5,8 @@ use std::path::Path;
 
 use anyhow::Context;
 use pleiad_agent::SettledEstimate;
-use pleiad_agent::results::AgentSummary;
-use pleiad_estimation::Timestamp;
+use pleiad_agent::results::{AgentSummary, Found, FoundLandmark, FoundParameter};
+use pleiad_estimation::{LandmarkId, Timestamp};
 use pleiad_recording::{IngestReport, ReadOptions, Recording, tum};
 use pleiad_report::{ReplayReport, RobotScore, replay_report, run_report, write_summary};
 use serde::Serialize;
@@ -28,6 +28,8 @@ pub struct ReplayJson {
     pub dead_reckoning_mean_rmse_m: Option<f64>,
     pub online_mean_position_rmse_m: Option<f64>,
     pub facts: FactsJson,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub found: Option<FoundJson>,
     pub payload_bytes: PayloadJson,
     /// Of the joint filter, which only `exact` has.
     pub nis: Option<NisJson>,
@@ -49,6 +51,15 @@ pub struct RobotJson {
     pub dead_reckoning_rmse_m: Option<f64>,
     pub online_position_rmse_m: Option<f64>,
     pub estimate: String,
+}
+
+/// What the team found out besides poses.
+#[derive(Debug, Serialize)]
+pub struct FoundJson {
+    pub parameters: Vec<FoundParameter>,
+    pub landmarks: Vec<FoundLandmark>,
+    /// Root mean square of the distances of the landmarks from where the recording says that they are.
+    pub landmark_rmse_m: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -80,7 +91,13 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let (recording, ingest) =
         pleiad_recording::open(&folder, &ReadOptions { skip_bad_rows: args.skip_bad_rows })?;
     let options = ReplayOptions {
-        filter: FilterArgs { strategy: args.strategy, error: args.error, relinearize: args.relinearize },
+        filter: FilterArgs {
+            strategy: args.strategy,
+            error: args.error,
+            relinearize: args.relinearize,
+            clutter: args.clutter,
+            calibrate: args.calibrate,
+        },
         landmarks: &args.landmarks,
         absolute: &args.absolute,
         start_s: args.start,
@@ -197,6 +214,7 @@ fn summary(
         }),
         online_mean_position_rmse_m: evaluation::mean_position_rmse_m(scores.iter(), |score| score.online),
         facts: facts(result),
+        found: found(recording, result),
         payload_bytes: PayloadJson {
             per_relative_observation: result
                 .ledger
@@ -211,6 +229,28 @@ fn summary(
         notes: result.notes.clone(),
         ingest,
     }
+}
+
+/// What is not known beforehand and nobody asks for is left out.
+fn found(recording: &Recording, result: &RunResult) -> Option<FoundJson> {
+    let found = result.robots.values().map(|own| &own.summary.found).max_by_key(|found| found.landmarks.len())?;
+    if *found == Found::default() {
+        return None;
+    }
+    let squares: Vec<f64> = found
+        .landmarks
+        .iter()
+        .filter_map(|mapped| {
+            let [x, y] = recording.landmarks.get(&LandmarkId(mapped.id))?;
+            Some((mapped.x_m - x).powi(2) + (mapped.y_m - y).powi(2))
+        })
+        .collect();
+    let mean = (!squares.is_empty()).then(|| squares.iter().sum::<f64>() / squares.len() as f64);
+    Some(FoundJson {
+        parameters: found.parameters.clone(),
+        landmarks: found.landmarks.clone(),
+        landmark_rmse_m: mean.map(f64::sqrt),
+    })
 }
 
 /// What became of the observations: as all robots know it, or as each counted its own.
@@ -258,6 +298,21 @@ fn write_trajectories(result: &RunResult, out: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+fn found_text(found: &FoundJson) -> String {
+    let mut text = String::new();
+    for FoundParameter { robot, name, value, sigma } in &found.parameters {
+        let _ = writeln!(text, "robot {robot}: {name} {value:.4} (sigma {sigma:.4})");
+    }
+    if !found.landmarks.is_empty() {
+        let _ = write!(text, "map of the team: {} landmarks", found.landmarks.len());
+        if let Some(rmse_m) = found.landmark_rmse_m {
+            let _ = write!(text, ", RMSE {rmse_m:.3} m");
+        }
+        text.push('\n');
+    }
+    text
+}
+
 /// The summary for people.
 pub fn text(json: &ReplayJson) -> String {
     let metres = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
@@ -295,6 +350,9 @@ pub fn text(json: &ReplayJson) -> String {
             nis.mean,
             100.0 * nis.within_95,
         );
+    }
+    if let Some(found) = &json.found {
+        text.push_str(&found_text(found));
     }
     if let Some(faults) = &json.faults {
         let what = &faults.befallen;

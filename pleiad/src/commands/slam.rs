@@ -7,7 +7,7 @@ use pleiad_estimation::RobotId;
 use pleiad_estimation::joint::ErrorForm;
 use pleiad_estimation::sample::{Reading, Target};
 use pleiad_estimation::slam::Association;
-use pleiad_estimation::strategy::{Noises, StrategyKind};
+use pleiad_estimation::strategy::Noises;
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_recording::ReadOptions;
 use pleiad_sim_peers::Scenario;
@@ -66,7 +66,7 @@ fn of_recording(args: &SlamArgs, options: &RunOptions) -> anyhow::Result<SlamPag
     let team = setup::recorded(
         &recording,
         &ReplayOptions {
-            filter: FilterArgs { strategy: StrategyKind::Exact, error: args.error, relinearize: None },
+            filter: FilterArgs::exact(args.error),
             landmarks: &LandmarksArg::Known,
             absolute: &[],
             start_s: args.start,

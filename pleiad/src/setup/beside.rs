@@ -25,8 +25,13 @@ pub fn write_beside(agents: &BTreeMap<RobotId, AgentConfig>, folder: &Path) -> a
     };
     let mut priors = BTreeMap::new();
     for (robot, agent) in agents {
-        let (filter, motion, sensors) = (agent.filter.clone(), agent.motion.clone(), agent.sensors.clone());
-        write(&format!("noise-r{robot}.toml"), toml::to_string(&NoiseFile { filter, motion, sensors })?)?;
+        let noise = NoiseFile {
+            filter: agent.filter.clone(),
+            motion: agent.motion.clone(),
+            sensors: agent.sensors.clone(),
+            calibration: agent.calibration,
+        };
+        write(&format!("noise-r{robot}.toml"), toml::to_string(&noise)?)?;
         if let Some(prior) = &agent.prior {
             priors.insert(robot.to_string(), prior);
         }

@@ -157,6 +157,8 @@ impl TryFrom<WireState> for NominalState {
         Ok(Self {
             nominal: check::pose("nominal", wire.nominal)?,
             noise_sum: check::covariance("noise_sum", wire.noise_sum)?,
+            // In the extension of the entry.
+            sensitivity: None,
         })
     }
 }

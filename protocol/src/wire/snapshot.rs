@@ -1,10 +1,13 @@
 //! Snapshots: the request, the parts it is sent in, and its bytes.
 
 use pleiad_estimation::fact::{ClockMap, Entry, EntryId, Fingerprint, LogId, Noise, Seal, Vote};
-use pleiad_estimation::joint::{ErrorForm, Joint, JointParts, Member};
+use pleiad_estimation::geometry::Matrix3;
+use pleiad_estimation::joint::{
+    Block, ErrorForm, Joint, JointParts, MappedLandmark, Member, ParameterKind, Parameters,
+};
 use pleiad_estimation::ledger::{Checkpoint, FactCounts, LogBase, Term, Views};
 use pleiad_estimation::symmetric::Symmetric3;
-use pleiad_estimation::{BootIndex, RobotId, Timestamp};
+use pleiad_estimation::{BootIndex, LandmarkId, RobotId, Timestamp};
 use serde::{Deserialize, Serialize};
 
 use super::check::{self, WirePose, WireSymmetric};
@@ -74,7 +77,24 @@ struct WireMember {
     correction: WirePose,
     nominal: WirePose,
     folded_noise: WireSymmetric,
+    /// By columns; none if nothing was ever folded.
+    folded_motion: Option<[f64; 9]>,
     placed: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+enum WireBlock {
+    Robot(WireMember),
+    Parameters { robot: u32, kind: WireParameters, value: [f64; 3], since_ns: i64 },
+    Landmark(u32, WirePose),
+    Free,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+enum WireParameters {
+    Motion,
+    Mount,
+    Clock,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -125,7 +145,74 @@ impl TryFrom<WireMember> for (Member, bool) {
             check::number("folded_noise", entry)?;
         }
         let (robot, boot) = (RobotId(wire.robot), BootIndex(wire.boot));
-        Ok((Member::new(robot, boot, correction, nominal, Symmetric3(wire.folded_noise)), wire.placed))
+        let mut member = Member::new(robot, boot, correction, nominal, Symmetric3(wire.folded_noise));
+        if let Some(columns) = wire.folded_motion {
+            for entry in columns {
+                check::number("folded_motion", entry)?;
+            }
+            member.folded_motion = Matrix3::from_column_slice(&columns);
+        }
+        Ok((member, wire.placed))
+    }
+}
+
+impl TryFrom<WireBlock> for (Block, bool) {
+    type Error = ProtocolError;
+
+    fn try_from(wire: WireBlock) -> Result<Self, ProtocolError> {
+        Ok(match wire {
+            WireBlock::Robot(member) => {
+                let (member, placed) = member.try_into()?;
+                (Block::Robot(member), placed)
+            }
+            WireBlock::Parameters { robot, kind, value, since_ns } => {
+                for entry in value {
+                    check::number("parameter", entry)?;
+                }
+                let kind = match kind {
+                    WireParameters::Motion => ParameterKind::Motion,
+                    WireParameters::Mount => ParameterKind::Mount,
+                    WireParameters::Clock => ParameterKind::Clock,
+                };
+                let (robot, since) = (RobotId(robot), Timestamp(since_ns));
+                (Block::Parameters(Parameters { robot, kind, value: value.into(), since }), false)
+            }
+            WireBlock::Landmark(landmark, pose) => {
+                let pose = check::pose("landmark", pose)?;
+                (Block::Landmark(MappedLandmark { landmark: LandmarkId(landmark), pose }), false)
+            }
+            WireBlock::Free => (Block::Free, false),
+        })
+    }
+}
+
+fn wire_block(block: &Block, placed: bool) -> WireBlock {
+    match block {
+        Block::Robot(member) => {
+            let motion = member.folded_motion;
+            WireBlock::Robot(WireMember {
+                robot: member.robot.0,
+                boot: member.boot.0,
+                correction: check::wire_pose(&member.correction),
+                nominal: check::wire_pose(&member.nominal),
+                folded_noise: member.folded_noise.0,
+                folded_motion: (motion != Matrix3::zeros())
+                    .then(|| std::array::from_fn(|entry| motion[entry])),
+                placed,
+            })
+        }
+        Block::Parameters(of) => WireBlock::Parameters {
+            robot: of.robot.0,
+            kind: match of.kind {
+                ParameterKind::Motion => WireParameters::Motion,
+                ParameterKind::Mount => WireParameters::Mount,
+                ParameterKind::Clock => WireParameters::Clock,
+            },
+            value: of.value.into(),
+            since_ns: of.since.0,
+        },
+        Block::Landmark(mapped) => WireBlock::Landmark(mapped.landmark.0, check::wire_pose(&mapped.pose)),
+        Block::Free => WireBlock::Free,
     }
 }
 
@@ -191,7 +278,7 @@ impl TryFrom<WireTerm> for Term {
     }
 }
 
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 /// A snapshot in bytes.
 pub fn encode(checkpoint: &Checkpoint) -> Vec<u8> {
@@ -209,14 +296,7 @@ pub fn encode(checkpoint: &Checkpoint) -> Vec<u8> {
     codec::put(&mut bytes, &head);
     codec::put_list(
         &mut bytes,
-        parts.members.iter().map(|(member, placed)| WireMember {
-            robot: member.robot.0,
-            boot: member.boot.0,
-            correction: check::wire_pose(&member.correction),
-            nominal: check::wire_pose(&member.nominal),
-            folded_noise: member.folded_noise.0,
-            placed: *placed,
-        }),
+        parts.blocks.iter().map(|(block, placed)| wire_block(block, *placed)),
     );
     codec::put_list(&mut bytes, parts.lower.iter().map(|entry| WireNumber(*entry)));
     let logs = checkpoint.logs.iter();
@@ -267,12 +347,12 @@ pub fn decode(bytes: &[u8]) -> Result<Checkpoint, ProtocolError> {
         return Err(ProtocolError::Version { found: head.version });
     }
     let most = limits::SNAPSHOT_ITEMS;
-    let members = reader.list::<WireMember, _>("snapshot.members", most)?;
+    let blocks = reader.list::<WireBlock, _>("snapshot.blocks", most)?;
     let lower = reader.list::<WireNumber, f64>("snapshot.covariance", most)?;
     let found = lower.len() as u64;
     let form = if head.additive { ErrorForm::Additive } else { ErrorForm::Invariant };
-    let parts = JointParts { members, lower, updates: head.updates };
-    let limit = (3 * parts.members.len() * (3 * parts.members.len() + 1) / 2) as u64;
+    let parts = JointParts { blocks, lower, updates: head.updates };
+    let limit = (3 * parts.blocks.len() * (3 * parts.blocks.len() + 1) / 2) as u64;
     let joint = Joint::from_parts(form, parts).ok_or(ProtocolError::TooMany {
         field: "snapshot.covariance".into(),
         found,

@@ -10,7 +10,6 @@ use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use pleiad_agent::config::{AgentConfig, ErrorName, FilterSection, RelinearizeSection};
 use pleiad_estimation::fold::FoldConfig;
-use pleiad_estimation::strategy::StrategyKind;
 use pleiad_recording::parallel;
 use pleiad_report::write_summary;
 use pleiad_sim_peers::{Scenario, simulate};
@@ -88,7 +87,7 @@ fn trial(
 ) -> anyhow::Result<Trial> {
     let run = simulate(scenario, seed)?;
     let truth = Truth::Tracks(run.tracks.clone());
-    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant, relinearize: None };
+    let filter = FilterArgs::exact(ErrorArg::Invariant);
     let team = setup::simulated(scenario, run, filter);
     let agent = team.agents.values().next().context("the scenario has no robot")?.clone();
     let configs: Vec<FoldConfig> =

@@ -71,7 +71,7 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
 
 /// The worlds, one per seed, and the faults of the file.
 fn worlds(args: &FaultsArgs) -> anyhow::Result<(FaultPlan, Vec<World>, Vec<String>)> {
-    let filter = FilterArgs { strategy: StrategyKind::Exact, error: ErrorArg::Invariant, relinearize: None };
+    let filter = FilterArgs::exact(ErrorArg::Invariant);
     let own = args.faults.as_deref().map(FaultPlan::load).transpose()?;
     if args.input.is_dir() {
         let folder = setup::recording_folder(&args.input);

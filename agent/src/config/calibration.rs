@@ -1,0 +1,101 @@
+//! `[calibration]` and `[filter.clutter]`: what the filter is to find out besides poses, and what is not to be believed.
+
+use pleiad_estimation::fact::Calibration;
+use pleiad_estimation::fold::Clutter;
+use pleiad_estimation::strategy::StrategyKind;
+use serde::{Deserialize, Serialize};
+
+use super::checks::{not_negative, positive, value};
+use super::sections::ErrorName;
+use super::{AgentConfig, ConfigError};
+
+/// `[calibration]`: standard deviations of what is not sure about a robot. What is zero is sure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CalibrationSection {
+    /// True over reported distance, less 1.
+    pub sigma_forward_scale: f64,
+    /// True over reported angle, less 1.
+    pub sigma_yaw_scale: f64,
+    /// Yaw rate shown at standstill, rad/s.
+    pub sigma_yaw_rate_bias_rad_s: f64,
+    /// Where the sensor of others sits, per axis, m.
+    pub sigma_mount_m: f64,
+    /// How it is turned, rad.
+    pub sigma_mount_rad: f64,
+    /// Local clock minus team time, s.
+    pub sigma_clock_offset_s: f64,
+    /// Rate of the clock, parts per million.
+    pub sigma_clock_drift_ppm: f64,
+}
+
+impl CalibrationSection {
+    fn checked(&self) -> Result<Calibration, ConfigError> {
+        let named = [
+            ("sigma_forward_scale", self.sigma_forward_scale),
+            ("sigma_yaw_scale", self.sigma_yaw_scale),
+            ("sigma_yaw_rate_bias_rad_s", self.sigma_yaw_rate_bias_rad_s),
+            ("sigma_mount_m", self.sigma_mount_m),
+            ("sigma_mount_rad", self.sigma_mount_rad),
+            ("sigma_clock_offset_s", self.sigma_clock_offset_s),
+            ("sigma_clock_drift_ppm", self.sigma_clock_drift_ppm),
+        ];
+        for (key, sigma) in named {
+            not_negative(&format!("calibration.{key}"), sigma)?;
+        }
+        Ok(Calibration {
+            motion: [self.sigma_forward_scale, self.sigma_yaw_scale, self.sigma_yaw_rate_bias_rad_s],
+            mount: [self.sigma_mount_m, self.sigma_mount_m, self.sigma_mount_rad],
+            clock: [self.sigma_clock_offset_s, 1e-6 * self.sigma_clock_drift_ppm],
+        })
+    }
+}
+
+/// `[filter.clutter]`: some observations are of nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClutterSection {
+    /// Share of observations that are of nothing.
+    pub share: f64,
+    /// How far sensors see, and how far from the origin position fixes may be, m.
+    pub reach_m: f64,
+}
+
+impl From<ClutterSection> for Clutter {
+    fn from(of: ClutterSection) -> Self {
+        Self { share: of.share, reach_m: of.reach_m }
+    }
+}
+
+impl AgentConfig {
+    /// What is to be calibrated; only facts can tell, and only in the invariant form.
+    pub(super) fn calibration(&self) -> Result<Option<Calibration>, ConfigError> {
+        let Some(section) = &self.calibration else { return Ok(None) };
+        self.needs_facts("calibration")?;
+        section.checked().map(Some)
+    }
+
+    pub(super) fn check_clutter(&self) -> Result<(), ConfigError> {
+        let Some(clutter) = &self.filter.clutter else { return Ok(()) };
+        if !(clutter.share > 0.0 && clutter.share < 1.0) {
+            return Err(value("filter.clutter.share", clutter.share, "between 0 and 1; without garbage remove the table"));
+        }
+        positive("filter.clutter.reach_m", clutter.reach_m)?;
+        if self.strategy == StrategyKind::Exact { Ok(()) } else { self.needs_facts("filter.clutter") }
+    }
+
+    /// What only the exact strategy with the invariant error has.
+    pub(super) fn needs_facts(&self, beside: &'static str) -> Result<(), ConfigError> {
+        let wrong = |key: &str, found: String, expected| {
+            Err(ConfigError::Value { key: format!("{key} (beside {beside})"), found, expected })
+        };
+        if self.strategy != StrategyKind::Exact {
+            return wrong("strategy", format!("\"{}\"", self.strategy), "\"exact\": no other strategy keeps facts");
+        }
+        if self.filter.error == ErrorName::Additive {
+            let expected = "\"invariant\": the additive form has neither parameters nor landmarks of its own";
+            return wrong("filter.error", "\"additive\"".to_owned(), expected);
+        }
+        Ok(())
+    }
+}
