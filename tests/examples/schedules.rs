@@ -1,7 +1,8 @@
 //! Runs simulated schedules of a team: `cargo run -p pleiad-tests --features planted --example schedules -- --seeds A..B`.
 //!
 //! `--partitions` leaves out everything but losses and partitions; `--evictions` adds evictions. `--most-items N`
-//! sets `ledger.most_items`, `--relinearize` has facts linearized together. `--keep-going`
+//! sets `ledger.most_items`, `--relinearize` has facts linearized together,
+//! `--calibrate` has parameters, landmarks and garbage found out. `--keep-going`
 //! does not stop at the first seed that fails. `--resume FILE` keeps there how far it has come, and goes on
 //! from there. `--plant NAME` plants a mistake and tells which seed finds it.
 //! A seed that fails is printed with the command that replays it.
@@ -46,6 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--evictions" => options.evictions = true,
             "--most-items" => options.most_items = Some(value()?.parse()?),
             "--relinearize" => options.relinearize = true,
+            "--calibrate" => options.calibrate = true,
             "--keep-going" => keep_going = true,
             "--resume" => resume = Some(PathBuf::from(value()?)),
             "--plant" => {
@@ -54,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             other => {
                 return Err(format!(
-                    "{other}: expected --seeds, --partitions, --evictions, --most-items, --relinearize, --keep-going, --resume or --plant"
+                    "{other}: expected --seeds, --partitions, --evictions, --most-items, --relinearize, --calibrate, --keep-going, --resume or --plant"
                 )
                 .into());
             }
@@ -80,6 +82,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let most =
                     options.most_items.map_or_else(String::new, |items| format!(" --most-items {items}"));
                 let most = if options.relinearize { format!("{most} --relinearize") } else { most };
+            let most = if options.calibrate { format!("{most} --calibrate") } else { most };
                 let plant = if plant.is_empty() { String::new() } else { format!(" --plant {plant}") };
                 println!(
                     "replay: cargo run -p pleiad-tests --features planted --example schedules -- --seeds {seed}..{}{kind}{most}{plant}",

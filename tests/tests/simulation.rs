@@ -16,6 +16,7 @@ fn all(seeds: std::ops::Range<u64>, options: &Options) -> Vec<Outcome> {
             };
             let most = options.most_items.map_or_else(String::new, |items| format!(" --most-items {items}"));
             let most = if options.relinearize { format!("{most} --relinearize") } else { most };
+            let most = if options.calibrate { format!("{most} --calibrate") } else { most };
             panic!(
                 "seed {seed}: {violation}\nreplay: cargo run -p pleiad-tests --features planted \
                  --example schedules -- --seeds {seed}..{}{kind}{most}",
@@ -50,6 +51,16 @@ fn facts_linearized_together_are_those_of_one_fold_after_evictions_and_crashes()
     let outcomes = all(0..60, &Options { evictions: true, relinearize: true, ..Options::default() });
     let total = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
     assert!(total(|outcome| outcome.deaths) > 30 && total(|outcome| outcome.cuts) > 1000);
+}
+
+#[test]
+fn what_is_found_out_besides_poses_is_that_of_one_fold_after_evictions_and_crashes() {
+    for relinearize in [false, true] {
+        let options = Options { evictions: true, calibrate: true, relinearize, ..Options::default() };
+        let outcomes = all(0..60, &options);
+        let total = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
+        assert!(total(|outcome| outcome.deaths) > 30 && total(|outcome| outcome.cuts) > 1000);
+    }
 }
 
 /// Seeds that have found a mistake in the rules, in the node or in the harness; `docs/ledger.md` says which.

@@ -112,7 +112,7 @@ fn of_boot(extension: &[u8]) -> Option<(Calibration, Option<Sensitivity>)> {
 }
 
 /// Fills in what the extension of an entry says of the state or the boot in it.
-pub(crate) fn read_extension(entry: &mut Entry) {
+pub fn read_extension(entry: &mut Entry) {
     if entry.extension.is_empty() {
         return;
     }

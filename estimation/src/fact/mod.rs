@@ -6,8 +6,7 @@ mod entry;
 mod fingerprint;
 mod seal;
 
-pub(crate) use calibration::read_extension;
-pub use calibration::{Calibration, Sensitivity, extension_of_boot, extension_of_state};
+pub use calibration::{Calibration, Sensitivity, extension_of_boot, extension_of_state, read_extension};
 pub use entry::{
     Absolute, Answer, Body, Boot, ClockMap, Continuation, Entry, EntryId, Half, LogId, Noise, NoiseRef,
     NominalState, Observation, Profile, Quantity, VoidReason,

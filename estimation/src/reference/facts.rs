@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
-use crate::fact::{Answer, Body, Boot, Entry, EntryId, Fingerprint, Noise, NoiseRef, NominalState, Quantity};
+use crate::fact::{
+    Answer, Body, Boot, Entry, EntryId, Fingerprint, Noise, NoiseRef, NominalState, Quantity, read_extension,
+};
 use crate::{BootIndex, RobotId, Timestamp};
 
 /// Something the filter folds.
@@ -76,10 +78,12 @@ pub(super) fn noise_matrix(noise: &Noise) -> Option<DMatrix<f64>> {
 /// observation the first in `(boot, sequence)` counts. Left out are observations of a robot that
 /// has not answered or answered void, and observations whose noise profile is not among the entries.
 pub fn facts_from_entries(entries: &[Entry]) -> Vec<ReferenceFact> {
-    let mut unique: BTreeMap<EntryId, &Entry> = BTreeMap::new();
+    let mut unique: BTreeMap<EntryId, Entry> = BTreeMap::new();
     for entry in entries {
-        let kept = unique.entry(entry.id).or_insert(entry);
-        if *kept != entry && Fingerprint::of(entry) < Fingerprint::of(kept) {
+        let mut entry = entry.clone();
+        read_extension(&mut entry);
+        let kept = unique.entry(entry.id).or_insert_with(|| entry.clone());
+        if *kept != entry && Fingerprint::of(&entry) < Fingerprint::of(kept) {
             *kept = entry;
         }
     }

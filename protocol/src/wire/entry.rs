@@ -2,7 +2,7 @@
 
 use pleiad_estimation::fact::{
     Absolute, Answer, Body, Boot, ClockMap, Continuation, Entry, EntryId, Half, LogId, Noise, NoiseRef,
-    NominalState, Observation, Profile, Quantity, VoidReason,
+    NominalState, Observation, Profile, Quantity, VoidReason, read_extension,
 };
 use pleiad_estimation::sample::Relative;
 use pleiad_estimation::{BootIndex, LandmarkId, RobotId, Sequence, Timestamp};
@@ -325,7 +325,9 @@ impl TryFrom<WireBody> for Body {
                 continuation: continuation
                     .map(Continuation::try_from)
                     .transpose()
-                    .map_err(inside("boot.continuation"))?, calibration: None }),
+                    .map_err(inside("boot.continuation"))?,
+                calibration: None,
+            }),
             WireBody::Profile { index, noise } => Self::Profile(Profile {
                 index,
                 noise: check::noise("profile.noise", noise.dimension, noise.lower)?,
@@ -379,6 +381,9 @@ impl TryFrom<WireEntry> for Entry {
                 limit: limits::EXTENSION_BYTES as u64,
             }));
         }
-        Ok(Self { id, body: wire.body.try_into().map_err(named)?, extension: wire.extension })
+        let body = wire.body.try_into().map_err(named)?;
+        let mut entry = Self { id, body, extension: wire.extension };
+        read_extension(&mut entry);
+        Ok(entry)
     }
 }

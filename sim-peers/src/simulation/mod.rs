@@ -36,4 +36,6 @@ pub struct Options {
     /// Facts are linearized together. There is no oracle of that: the estimate is held against one fold of all that is
     /// accepted.
     pub relinearize: bool,
+    /// Robots ask for their parameters, for the place of the landmark, and weigh garbage. There is no oracle of that either.
+    pub calibrate: bool,
 }

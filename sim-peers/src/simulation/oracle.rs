@@ -3,7 +3,7 @@
 use pleiad_estimation::RobotId;
 use pleiad_estimation::fold::FoldConfig;
 use pleiad_estimation::geometry::Matrix3;
-use pleiad_estimation::joint::{ErrorForm, Joint};
+use pleiad_estimation::joint::{Block, ErrorForm, Joint};
 use pleiad_estimation::reference::{self, JointEkf, JointEstimate, ReferenceFact};
 
 use super::units::{UNITS, folded, in_units, pose};
@@ -17,7 +17,8 @@ const ROUNDINGS: f64 = 4.0;
 
 /// Whether a ledger believes what the oracle does, or what is off.
 pub fn agrees(joint: &Joint, facts: &[ReferenceFact], fold: &FoldConfig) -> Result<(), String> {
-    if fold.relinearize.is_some() {
+    let parameters = |block: &Block| !matches!(block, Block::Robot(_));
+    if fold.relinearize.is_some() || fold.clutter.is_some() || joint.blocks().iter().any(parameters) {
         return at_once(joint, &folded(facts, fold));
     }
     let form = match fold.form {

@@ -55,6 +55,8 @@ pub struct Plan {
     pub most_items: Option<usize>,
     /// Facts are linearized together.
     pub relinearize: bool,
+    /// Parameters, the landmark and garbage are found out.
+    pub calibrate: bool,
     /// The nominal trajectories begin anew that far from their origin, m.
     pub rebase_m: f64,
     /// What links do at first.
@@ -79,6 +81,7 @@ impl Plan {
             evict_after_s: (chance.happens(0.15) && options.evictions).then_some(8.0),
             most_items: options.most_items,
             relinearize: options.relinearize,
+            calibrate: options.calibrate,
             rebase_m,
             weather: weather(&mut chance),
             blows: Vec::new(),

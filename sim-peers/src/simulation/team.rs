@@ -28,18 +28,24 @@ pub fn config(plan: &Plan, robot: u32, start: &Pose2) -> Result<NodeConfig, Stri
         let evict = plan.evict_after_s.map_or_else(String::new, |s| format!("evict_after_s = {s:?}\n"));
         format!("members = [{}]\ncell_s = {cell_s:?}\n{evict}", members.join(","))
     });
-    let filter = if plan.relinearize {
-        "[filter]\nrelinearize = { block_s = 0.5, ahead_s = 1.0, passes = 3 }\n"
-    } else {
-        ""
-    };
+    let mut filter = String::from("[filter]\n");
+    if plan.relinearize {
+        filter.push_str("relinearize = { block_s = 0.5, ahead_s = 1.0, passes = 3 }\n");
+    }
+    let mut landmarks = "landmarks = [{ id = 7, x_m = 3.0, y_m = -4.0 }]\n";
+    let mut unknown = "";
+    if plan.calibrate {
+        filter.push_str("clutter = { share = 0.05, reach_m = 30.0 }\n");
+        filter.push_str("[calibration]\nsigma_forward_scale = 0.05\nsigma_yaw_scale = 0.05\n");
+        filter.push_str("sigma_mount_m = 0.05\nsigma_mount_rad = 0.02\nsigma_clock_offset_s = 0.02\n");
+        (landmarks, unknown) = ("", "unknown_landmarks = 'map'\n");
+    }
     let text = format!(
         "team = 'simulation'\nrobot = {robot}\n\
          prior = {{ x_m = {:?}, y_m = {:?}, heading_rad = {:?}, sigma_position_m = 0.1, sigma_heading_rad = 0.05 }}\n\
-         landmarks = [{{ id = 7, x_m = 3.0, y_m = -4.0 }}]\n\
-         {filter}[ledger]\n{ledger}{most}late_s = 0.5\nrebase_m = {:?}\n\
+         {landmarks}{filter}[ledger]\n{ledger}{most}late_s = 0.5\nrebase_m = {:?}\n\
          [motion]\nlongest_gap_s = 1.0\n\
-         [sensors]\n\
+         [sensors]\n{unknown}\
          relative_pose = {{ sigma_position_m = 0.05, sigma_yaw_rad = 0.02 }}\n\
          relative_position = {{ sigma_m = 0.06 }}\n\
          range_bearing = {{ sigma_range_m = 0.08, sigma_bearing_rad = 0.04 }}\n\

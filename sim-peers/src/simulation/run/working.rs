@@ -58,6 +58,7 @@ pub fn operate(
         evict_after_s: None,
         most_items: None,
         relinearize: false,
+        calibrate: false,
         rebase_m: 300.0,
         weather,
         blows,
