@@ -321,7 +321,13 @@ impl Node {
             Body::Half(Half { answer: Answer::State { state, .. }, .. }) => state.sensitivity,
             _ => None,
         };
-        let extension = state.map_or_else(Vec::new, |sensitivity| extension_of_state(&sensitivity));
+        let odometry = self.config.calibration.is_some_and(|of| of.motion != [0.0; 3]);
+        let extension = state.map_or_else(Vec::new, |mut sensitivity| {
+            if !odometry {
+                sensitivity.motion.fill(0.0);
+            }
+            extension_of_state(&sensitivity)
+        });
         self.say_more(boot, body, extension);
     }
 

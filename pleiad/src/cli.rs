@@ -119,7 +119,8 @@ pub struct RunArgs {
     #[arg(long, value_name = "SHARE:REACH_M")]
     pub clutter: Option<ClutterArg>,
     /// What is not sure about the robots and is to be found out, by standard deviations: forward and yaw (scales of the odometry),
-    /// bias (yaw rate, rad/s), mount_m and mount_rad (the sensor of others), clock (s) and drift_ppm.
+    /// bias (yaw rate, rad/s), mount_m and mount_rad (the sensor of others), clock (s) and
+    /// drift_ppm (of all robots but the first).
     #[arg(long, value_name = "NAME=SIGMA,...")]
     pub calibrate: Option<CalibrateArg>,
     /// A file of fault tables: what goes wrong between the robots and with their processes (docs/faults.md);
@@ -156,7 +157,8 @@ pub struct ReplayArgs {
     #[arg(long, value_name = "SHARE:REACH_M")]
     pub clutter: Option<ClutterArg>,
     /// What is not sure about the robots and is to be found out, by standard deviations: forward and yaw (scales of the odometry),
-    /// bias (yaw rate, rad/s), mount_m and mount_rad (the sensor of others), clock (s) and drift_ppm.
+    /// bias (yaw rate, rad/s), mount_m and mount_rad (the sensor of others), clock (s) and
+    /// drift_ppm (of all robots but the first).
     #[arg(long, value_name = "NAME=SIGMA,...")]
     pub calibrate: Option<CalibrateArg>,
     /// Which landmarks the robots know: known, none, numbers as in 6,7, or team: none, and the team maps them.

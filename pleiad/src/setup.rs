@@ -136,6 +136,16 @@ fn configuration(
     }
 }
 
+/// Where clocks are asked for, that of the first robot is the team's: only differences can be told from one another.
+fn keep_time<'a>(robot: RobotId, agent: &mut AgentConfig, mut team: impl Iterator<Item = &'a RobotId>) {
+    if let Some(calibration) = &mut agent.calibration
+        && team.next() == Some(&robot)
+    {
+        calibration.sigma_clock_offset_s = 0.0;
+        calibration.sigma_clock_drift_ppm = 0.0;
+    }
+}
+
 fn map(recording: &Recording) -> Vec<LandmarkRow> {
     let rows = recording.landmarks.iter();
     rows.map(|(id, [x_m, y_m])| LandmarkRow { id: id.0, x_m: *x_m, y_m: *y_m }).collect()
@@ -147,6 +157,7 @@ pub fn simulated(scenario: &Scenario, run: SimulatedRun, filter: FilterArgs) -> 
     let mut configured = BTreeMap::new();
     for (robot, settings) in &scenario.robots {
         let mut agent = configuration(*robot, &noise_of(settings), filter, &landmarks);
+        keep_time(*robot, &mut agent, scenario.robots.keys());
         agent.prior = run.priors.get(robot).map(agents::prior);
         configured.insert(*robot, agent);
     }
@@ -224,6 +235,7 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
     for (robot, channels) in &recording.robots {
         let noise = noise_for(*robot, &recording, options)?;
         let mut agent = configuration(*robot, &noise, options.filter, &landmarks);
+        keep_time(*robot, &mut agent, recording.robots.keys());
         agent.model.clone_from(&model);
         if unknown {
             agent.sensors.unknown_landmarks = UnknownLandmarks::Map;

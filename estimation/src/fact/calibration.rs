@@ -65,6 +65,7 @@ impl Sensitivity {
 const CALIBRATION: u8 = 1;
 const SENSITIVITY: u8 = 2;
 const CARRIED_ON: u8 = 3;
+const TWIST: u8 = 4;
 
 /// The extension of an entry that begins a boot of a robot with these uncertainties; `last` is that of the nominal state
 /// with which the boot carried on from ended.
@@ -74,8 +75,11 @@ pub fn extension_of_boot(calibration: &Calibration, last: Option<&Sensitivity>) 
     bytes(tag, &[calibration.numbers().as_slice(), &last].concat())
 }
 
-/// The extension of an entry with a nominal state.
+/// The extension of an entry with a nominal state. A state that does not depend on the odometry's parameters says its velocity alone.
 pub fn extension_of_state(sensitivity: &Sensitivity) -> Vec<u8> {
+    if sensitivity.motion == Matrix3::zeros() {
+        return bytes(TWIST, sensitivity.twist.as_slice());
+    }
     bytes(SENSITIVITY, &sensitivity.numbers())
 }
 
@@ -116,7 +120,10 @@ pub fn read_extension(entry: &mut Entry) {
     if entry.extension.is_empty() {
         return;
     }
-    let sensitivity = numbers::<12>(SENSITIVITY, &entry.extension).map(|of| Sensitivity::of(&of));
+    let sensitivity = match numbers::<3>(TWIST, &entry.extension) {
+        Some(twist) => Some(Sensitivity { motion: Matrix3::zeros(), twist: twist.into() }),
+        None => numbers::<12>(SENSITIVITY, &entry.extension).map(|of| Sensitivity::of(&of)),
+    };
     match &mut entry.body {
         Body::Observation(observation) => observation.observer.sensitivity = sensitivity,
         Body::Half(Half { answer: Answer::State { state, .. }, .. }) => state.sensitivity = sensitivity,
@@ -164,11 +171,14 @@ mod tests {
             twist: Vector3::new(-1.0, 0.5, 0.25),
         };
         assert_eq!(read(extension_of_state(&said)), Some(said));
+        let velocity = Sensitivity { motion: Matrix3::zeros(), ..said };
+        assert_eq!(extension_of_state(&velocity).len(), 25);
+        assert_eq!(read(extension_of_state(&velocity)), Some(velocity));
     }
 
     #[test]
     fn what_is_not_a_sensitivity_is_left_alone() {
-        let zero = Sensitivity { motion: Matrix3::zeros(), twist: Vector3::zeros() };
+        let zero = Sensitivity { motion: Matrix3::identity(), twist: Vector3::zeros() };
         let mut short = extension_of_state(&zero);
         short.pop();
         let mut other = extension_of_state(&zero);
