@@ -1,5 +1,6 @@
 //! The fold: one fact at a time, in the order of their keys, into the joint state.
 
+mod across;
 mod window;
 
 pub use window::Relinearization;
@@ -27,6 +28,9 @@ pub struct FoldConfig {
     pub gate: [f64; 3],
     /// Some observations are of nothing; `None` if all are of what they say.
     pub clutter: Option<Clutter>,
+    /// A robot without a prior begins a frame of its own, until what is seen between frames tells how they lie to one another.
+    /// Without it such a robot has no place.
+    pub join: bool,
     /// Facts are linearized together; `None` for each where those before it put the robots.
     pub relinearize: Option<Relinearization>,
 }
@@ -65,7 +69,7 @@ impl Clutter {
 
 impl Default for FoldConfig {
     fn default() -> Self {
-        Self { form: ErrorForm::Invariant, gate: DEFAULT_GATE, clutter: None, relinearize: None }
+        Self { form: ErrorForm::Invariant, gate: DEFAULT_GATE, clutter: None, join: false, relinearize: None }
     }
 }
 
@@ -85,6 +89,7 @@ impl FoldConfig {
         let clutter = self.clutter.iter().flat_map(|of| [of.share, of.reach_m].map(f64::to_bits));
         // Told apart from what follows by their number.
         let words = words.chain(clutter).chain(self.clutter.iter().map(|_| 1)).chain(together);
+        let words = words.chain(self.join.then_some(2));
         let Fingerprint(bytes) = Fingerprint::of_words(words);
         bytes[..8].iter().fold(0, |hash, byte| hash << 8 | u64::from(*byte))
     }
@@ -179,6 +184,13 @@ pub enum Outcome {
     Placed,
     /// The joint was updated.
     Used,
+    /// It was seen between two frames of which it is not yet known how they lie to one another, and waits for more.
+    Tied,
+    /// It was the last that was needed to know how two frames lie to one another.
+    Joined {
+        /// Numbers measured beyond the three that it takes. Without any, nothing could contradict.
+        redundancy: usize,
+    },
     /// The gate refused it.
     Rejected {
         /// The gate.
@@ -237,6 +249,9 @@ pub fn fold(joint: &mut Joint, config: &FoldConfig, key: &FactKey, fact: &Fact) 
     match fact {
         Fact::Boot(boot) => {
             joint.boot(key.id.robot, key.id.boot, boot);
+            if config.join {
+                joint.begin_frame(key.id.robot, key.id.boot, boot);
+            }
             Residual::without_measurement(Outcome::Booted)
         }
         Fact::Observation { quantity, noise, observer, other } => {
@@ -258,7 +273,7 @@ fn fold_observation(
 ) -> Result<Residual, SkipReason> {
     let noise = measurement::noise_matrix(&usable(quantity, noise)?);
     if let Quantity::Absolute(crate::fact::Absolute::Pose(z)) = quantity
-        && joint.index(key.id.robot).is_none()
+        && (joint.index(key.id.robot).is_none() || joint.is_alone(key.id.robot))
     {
         joint.place(key.id.robot, key.id.boot, z, &noise, observer);
         return Ok(Residual::without_measurement(Outcome::Placed));
@@ -268,6 +283,9 @@ fn fold_observation(
         if let Some(state) = state {
             joint.propagate(*index, state);
         }
+    }
+    if across::is_across(joint, quantity, &taken) {
+        return across::fold_across(joint, config, key, quantity, &noise, &taken);
     }
     let (poses, influences) = seen_poses(joint, key.time, quantity, &taken);
     if let (Quantity::Feature { landmark, relative }, [from]) = (quantity, poses.as_slice()) {

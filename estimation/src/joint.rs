@@ -1,10 +1,13 @@
 //! The joint state of the team: a correction per robot and one covariance over all of them.
 
 mod block;
+mod component;
 mod covariance;
 mod view;
 
 pub use block::{Block, MappedLandmark, Member, ParameterKind, Parameters};
+pub use component::{Anchor, Component, End, Measured, Tie};
+pub(crate) use component::Placement;
 pub use covariance::JointCovariance;
 pub(crate) use covariance::{Prepared, squared};
 pub(crate) use view::{RobotView, clock_influence};
@@ -32,6 +35,8 @@ pub struct JointParts {
     pub blocks: Vec<(Block, bool)>,
     /// Packed lower triangle of the covariance, row after row.
     pub lower: Vec<f64>,
+    /// What was measured across components.
+    pub ties: Vec<Tie>,
     /// How many measurements went into it.
     pub updates: u64,
 }
@@ -67,13 +72,14 @@ pub struct Joint {
     form: ErrorForm,
     blocks: Vec<Block>,
     covariance: JointCovariance,
+    ties: Vec<Tie>,
     updates: u64,
 }
 
 impl Joint {
     /// No robot yet.
     pub fn new(form: ErrorForm) -> Self {
-        Self { form, blocks: Vec::new(), covariance: JointCovariance::default(), updates: 0 }
+        Self { form, blocks: Vec::new(), covariance: JointCovariance::default(), ties: Vec::new(), updates: 0 }
     }
 
     /// In which coordinates the error is Gaussian.
@@ -141,7 +147,12 @@ impl Joint {
     /// All there is to it, robots without a place included: from the parts a joint can be made again.
     pub fn parts(&self) -> JointParts {
         let blocks = self.blocks.iter().map(|block| (*block, block.placed().is_some()));
-        JointParts { blocks: blocks.collect(), lower: self.covariance.lower().to_vec(), updates: self.updates }
+        JointParts {
+            blocks: blocks.collect(),
+            lower: self.covariance.lower().to_vec(),
+            ties: self.ties.clone(),
+            updates: self.updates,
+        }
     }
 
     /// The joint of these parts; `None` if the covariance does not have rows for every block.
@@ -151,7 +162,13 @@ impl Joint {
             Block::Robot(member) => Block::Robot(Member { placed, ..member }),
             other => other,
         });
-        Some(Self { form, blocks: blocks.collect(), covariance, updates: parts.updates })
+        let blocks: Vec<Block> = blocks.collect();
+        let anchored = |end: &End| match end {
+            End::Anchor(index) => matches!(blocks.get(*index), Some(Block::Anchor(_))),
+            End::Map | End::Point(_) => true,
+        };
+        let sound = parts.ties.iter().all(|tie| tie.ends.iter().all(anchored));
+        sound.then_some(Self { form, blocks, covariance, ties: parts.ties, updates: parts.updates })
     }
 
     /// Estimate and covariance of one robot at `state` of its nominal trajectory, when its clock shows `time`. The covariance is of
@@ -198,6 +215,31 @@ impl Joint {
             block = m * block * m.transpose();
         }
         self.covariance.set_diagonal(index, Symmetric3::from_lower(&block));
+    }
+
+    /// A robot that has no place anywhere begins a frame of its own with a boot.
+    pub(crate) fn begin_frame(&mut self, robot: RobotId, index: BootIndex, boot: &Boot) {
+        if self.form != ErrorForm::Invariant || self.index(robot).is_some() {
+            return;
+        }
+        self.untie_the_lost();
+        let at = NominalState::new(boot.nominal, Symmetric3::zero());
+        self.place(robot, index, &Pose2::identity(), &Matrix3::zeros(), &at);
+        if let Some(row) = self.index(robot) {
+            self.part_mut(row).component = Component::new(boot.time, robot);
+        }
+    }
+
+    /// Whether a robot is in a frame of its own from which nothing was seen.
+    pub(crate) fn is_alone(&self, robot: RobotId) -> bool {
+        let Some(own) = self.member(robot).map(|member| member.component) else { return false };
+        let in_it = (0..self.blocks.len()).filter(|index| self.component(*index) == Some(own)).count();
+        own != Component::MAP && in_it == 1
+    }
+
+    /// The error of a block moves with that of another: `x_i <- x_i + A x_m`.
+    pub(crate) fn couple(&mut self, i: usize, m: usize, a: &Matrix3) {
+        self.covariance.couple(i, m, a);
     }
 
     fn add(&mut self, block: Block) -> usize {
@@ -345,6 +387,7 @@ impl Joint {
     pub(crate) fn frame(&self, index: usize) -> &Pose2 {
         match &self.blocks[index] {
             Block::Landmark(mapped) => &mapped.pose,
+            Block::Anchor(anchor) => &anchor.pose,
             _ => &self.part(index).correction,
         }
     }
@@ -353,6 +396,7 @@ impl Joint {
     pub(crate) fn set_frame(&mut self, index: usize, frame: Pose2) {
         match &mut self.blocks[index] {
             Block::Landmark(mapped) => mapped.pose = frame,
+            Block::Anchor(anchor) => anchor.pose = frame,
             _ => self.part_mut(index).correction = frame,
         }
     }
@@ -371,7 +415,8 @@ impl Joint {
         spread: &Matrix3,
     ) {
         let pose = from.compose(&Pose2::new(position.x, position.y, 0.0));
-        let index = self.add(Block::Landmark(MappedLandmark { landmark, pose }));
+        let component = self.component(observer).unwrap_or(Component::MAP);
+        let index = self.add(Block::Landmark(MappedLandmark { landmark, pose, component }));
         self.covariance.couple(index, observer, &Matrix3::identity());
         if let Some((mount, by)) = mount {
             self.covariance.couple(index, mount, &by);
@@ -462,6 +507,7 @@ impl Joint {
             }
             (Block::Parameters(of), _) => of.value += delta,
             (Block::Landmark(mapped), _) => mapped.pose = Pose2::exp(delta).compose(&mapped.pose),
+            (Block::Anchor(anchor), _) => anchor.pose = Pose2::exp(delta).compose(&anchor.pose),
             (Block::Robot(_) | Block::Free, _) => {}
         }
     }
@@ -469,6 +515,7 @@ impl Joint {
     /// The bits of the estimate, for comparing two of them: robots, corrections, covariance.
     pub(crate) fn words(&self) -> impl Iterator<Item = u64> + '_ {
         let blocks = self.blocks.iter().flat_map(Block::words);
+        let blocks = blocks.chain(self.ties.iter().flat_map(Tie::words));
         blocks.chain(self.covariance.lower().iter().map(|entry| entry.to_bits()))
     }
 }

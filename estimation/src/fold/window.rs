@@ -9,7 +9,7 @@
 //! So a motion common to the team stays in the null space of every relative measurement, wherever each of them is
 //! linearized.
 
-use crate::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, Taken, fold, linearize, taken};
+use crate::fold::{across, Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, Taken, fold, linearize, taken};
 use crate::geometry::{Matrix3, Vector3};
 use crate::joint::{Block, ErrorForm, Joint, Participant, Prepared};
 use crate::measurement::{self, Linearization};
@@ -109,6 +109,12 @@ fn fold_window(
 
 /// Whether a fact changes no robot's place in the map.
 fn is_measurement(joint: &Joint, key: &FactKey, fact: &Fact) -> bool {
+    if let Fact::Observation { quantity, observer, other, .. } = fact
+        && taken(joint, key, quantity, observer, other.as_ref())
+            .is_ok_and(|taken| across::is_across(joint, quantity, &taken))
+    {
+        return false;
+    }
     match fact {
         Fact::Boot(_) => false,
         Fact::Observation { quantity: Quantity::Absolute(crate::fact::Absolute::Pose(_)), .. } => {

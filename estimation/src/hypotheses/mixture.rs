@@ -317,7 +317,7 @@ pub(super) fn joint_at(pose: &Pose2, covariance: &Matrix3, at: &NominalState, up
     let correction = pose.compose(&at.nominal.inverse());
     let member = Member::new(ROBOT, BOOT, correction, at.nominal, at.noise_sum);
     let Symmetric3(lower) = Symmetric3::from_lower(covariance);
-    let parts = JointParts { blocks: vec![(Block::Robot(member), true)], lower: lower.to_vec(), updates };
+    let parts = JointParts { blocks: vec![(Block::Robot(member), true)], lower: lower.to_vec(), ties: Vec::new(), updates };
     // A robot's block has six entries: there is nothing that could not fit.
     Joint::from_parts(ErrorForm::Invariant, parts).unwrap_or_else(|| Joint::new(ErrorForm::Invariant))
 }

@@ -1,5 +1,6 @@
 //! What the rows of the joint state stand for, three by three.
 
+use super::component::{Anchor, Component};
 use crate::fact::Calibration;
 use crate::geometry::{Matrix3, Vector3};
 use crate::symmetric::Symmetric3;
@@ -21,6 +22,8 @@ pub struct Member {
     /// The derivative by the parameters of the odometry already folded
     /// ([`Sensitivity::motion`](crate::fact::Sensitivity)).
     pub folded_motion: Matrix3,
+    /// The frame it has a place in.
+    pub component: Component,
     pub(super) placed: bool,
 }
 
@@ -34,7 +37,8 @@ impl Member {
         folded_noise: Symmetric3,
     ) -> Self {
         let folded_motion = Matrix3::zeros();
-        Self { robot, boot, correction, nominal, folded_noise, folded_motion, placed: true }
+        let component = Component::MAP;
+        Self { robot, boot, correction, nominal, folded_noise, folded_motion, component, placed: true }
     }
 }
 
@@ -67,8 +71,10 @@ pub struct Parameters {
 pub struct MappedLandmark {
     /// Which.
     pub landmark: LandmarkId,
-    /// `map_from_landmark`; of its heading nothing is ever asked.
+    /// Its pose in its component; of its heading nothing is ever asked.
     pub pose: Pose2,
+    /// The frame it has a place in.
+    pub component: Component,
 }
 
 /// What three rows of the joint state stand for.
@@ -80,6 +86,8 @@ pub enum Block {
     Parameters(Parameters),
     /// A landmark; the error of its pose, in the form of a robot's.
     Landmark(MappedLandmark),
+    /// A robot or a landmark as it was when something was seen across two components; in the form of a robot's.
+    Anchor(Anchor),
     /// Nothing any more.
     Free,
 }
@@ -105,6 +113,7 @@ impl Block {
                 ];
                 words.extend(pose(&member.correction));
                 words.extend(member.folded_noise.0.map(f64::to_bits));
+                words.extend(outside(member.component));
                 if member.folded_motion != Matrix3::zeros() {
                     words.extend(member.folded_motion.iter().map(|entry| entry.to_bits()));
                 }
@@ -118,11 +127,19 @@ impl Block {
             Self::Landmark(mapped) => {
                 let mut words = vec![u64::from(mapped.landmark.0)];
                 words.extend(pose(&mapped.pose));
+                words.extend(outside(mapped.component));
                 words
             }
+            Self::Anchor(anchor) => pose(&anchor.pose).into_iter().chain(outside(anchor.component)).collect(),
             Self::Free => vec![0],
         }
     }
+}
+
+/// A component that is not the map.
+fn outside(component: Component) -> Vec<u64> {
+    let (since, robot) = component.origin();
+    if component == Component::MAP { Vec::new() } else { vec![since.0.cast_unsigned(), u64::from(robot.0)] }
 }
 
 /// The groups of parameters that are uncertain, with their standard deviations.

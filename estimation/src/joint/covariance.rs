@@ -200,6 +200,56 @@ impl JointCovariance {
         self.add_diagonal(i, grown);
     }
 
+    /// `P <- P - V V^T`, by the columns of `V`.
+    pub(crate) fn downdate_by(&mut self, columns: &[Vec<f64>]) {
+        for column in columns {
+            self.add_outer(column, -1.0);
+        }
+    }
+
+    /// `P <- P + U S U^T`, by the rows of `U`.
+    pub(crate) fn add_through(&mut self, rows: &[Vector3], s: &Matrix3) {
+        let mut start = 0;
+        for (row, u) in rows.iter().enumerate() {
+            let along = s * u;
+            for (entry, other) in self.lower[start..=start + row].iter_mut().zip(rows) {
+                *entry += along.x * other.x + along.y * other.y + along.z * other.z;
+            }
+            start += row + 1;
+        }
+    }
+
+    /// The errors of the `moved` blocks become `tau + A x`, with the covariance `spread` of `tau` and `cross` of `tau` with
+    /// every row before.
+    pub(crate) fn move_blocks(&mut self, moved: &[bool], a: &Matrix3, spread: &Matrix3, cross: &[Vector3]) {
+        let with_tau = |block: usize| {
+            Matrix3::from_columns(&[cross[3 * block], cross[3 * block + 1], cross[3 * block + 2]])
+        };
+        for i in 0..moved.len() {
+            for j in 0..i {
+                let block = self.block(i, j);
+                let changed = match (moved[i], moved[j]) {
+                    (false, false) => continue,
+                    (true, false) => with_tau(j) + a * block,
+                    (false, true) => with_tau(i).transpose() + block * a.transpose(),
+                    (true, true) => {
+                        spread
+                            + with_tau(j) * a.transpose()
+                            + a * with_tau(i).transpose()
+                            + a * block * a.transpose()
+                    }
+                };
+                self.set_cross(i, j, &changed);
+            }
+            if moved[i] {
+                let own = a * with_tau(i).transpose();
+                let block = Symmetric3::from_lower(&self.block(i, i)).congruence(a);
+                let grown = Symmetric3::from_lower(&(own + own.transpose() + spread));
+                self.set_diagonal(i, block.plus(grown));
+            }
+        }
+    }
+
     /// `P <- P + factor d d^T`.
     pub(crate) fn add_outer(&mut self, d: &[f64], factor: f64) {
         let mut start = 0;

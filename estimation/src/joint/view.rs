@@ -1,6 +1,6 @@
 //! What the joint holds of one robot, enough to give its estimate until its next event.
 
-use super::{ErrorForm, Joint, ParameterKind, Parameters};
+use super::{Component, ErrorForm, Joint, ParameterKind, Parameters};
 use crate::fact::{NominalState, Sensitivity};
 use crate::geometry::{Matrix3, Vector3};
 use crate::symmetric::Symmetric3;
@@ -33,6 +33,9 @@ impl Joint {
     pub(crate) fn view(&self, robot: RobotId) -> Option<RobotView> {
         let index = self.index(robot)?;
         let member = self.part(index);
+        if member.component != Component::MAP {
+            return None;
+        }
         let kinds = [ParameterKind::Motion, ParameterKind::Clock];
         let rows: Vec<usize> =
             kinds.iter().filter_map(|kind| self.parameter_index(robot, *kind)).collect();

@@ -55,7 +55,7 @@ impl FactCounts {
             }
         }
         match record.residual.map(|residual| residual.outcome) {
-            Some(Outcome::Used) => self.used += 1,
+            Some(Outcome::Used | Outcome::Tied | Outcome::Joined { .. }) => self.used += 1,
             Some(Outcome::Rejected { .. }) => self.rejected += 1,
             Some(Outcome::Skipped(_)) => self.skipped += 1,
             Some(Outcome::Booted | Outcome::Placed) | None => {}

@@ -87,11 +87,25 @@ pub struct World<'a> {
     pub slip: f64,
     /// Ticks between sightings of robots.
     pub every: i64,
+    /// Which robots are told where they start: bit 0 is the first.
+    pub told: u32,
+    /// What sightings of robots measure.
+    pub kind: Kind,
+}
+
+/// What a sighting measures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    RangeBearing,
+    Range,
+    Bearing,
+    Position,
+    Pose,
 }
 
 impl Default for World<'_> {
     fn default() -> Self {
-        Self { gps: true, landmarks: &[], garbage: 0.0, slip: 1.0, every: 4 }
+        Self { gps: true, landmarks: &[], garbage: 0.0, slip: 1.0, every: 4, told: u32::MAX, kind: Kind::RangeBearing }
     }
 }
 
@@ -151,14 +165,16 @@ pub fn run(
         let error = PRIOR.map(|sigma| sigma * gaussian(&mut random));
         let prior = robot.at_label(0).compose(&Pose2::exp(Vector3::from(error)));
         let prior = Quantity::Absolute(Absolute::Pose(prior));
-        observation(&mut robot, number, 0, prior, &PRIOR);
+        if world.told >> index & 1 == 1 {
+            observation(&mut robot, number, 0, prior, &PRIOR);
+        }
         run.robots.push(robot);
     }
     for tick in 1..ticks {
         let observer = random.random_range(0..robots.len());
         let other = (observer + random.random_range(1..robots.len())) % robots.len();
         if tick % world.every == 0 {
-            sight(&mut run, observer, other, tick, world.garbage, &mut random);
+            sight(&mut run, observer, other, tick, &world, &mut random);
         }
         for (landmark, place) in world.landmarks.iter().enumerate() {
             // Each robot looks at each now and then, at ticks of its own.
@@ -215,22 +231,38 @@ fn sight(
     observer: usize,
     other: usize,
     tick: i64,
-    garbage: f64,
+    world: &World<'_>,
     random: &mut ChaCha8Rng,
 ) {
     let [x, y, yaw] = run.robots[observer].wrong.mount;
     let from = run.robots[observer].at_label(tick).compose(&Pose2::new(x, y, yaw));
     // Where the other one is at that true instant.
     let late = run.robots[other].wrong.late_ticks - run.robots[observer].wrong.late_ticks;
-    let seen = from.between(run.robots[other].at_label(tick + late)).position();
+    let whole = from.between(run.robots[other].at_label(tick + late));
+    let seen = whole.position();
     let mut relative = reading(seen, random);
     let (luck, range_m, bearing_rad) =
         (random.random::<f64>(), random.random_range(0.3..8.0), random.random_range(-3.1..3.1));
-    if luck < garbage {
+    if luck < world.garbage {
         relative = Relative::RangeBearing { range_m, bearing_rad };
     }
+    let Relative::RangeBearing { range_m, bearing_rad } = relative else { unreachable!() };
+    let (relative, sigmas): (Relative, &[f64]) = match world.kind {
+        Kind::RangeBearing => (relative, &SIGHTING),
+        Kind::Range => (Relative::Range { range_m }, &SIGHTING[..1]),
+        Kind::Bearing => (Relative::Bearing { bearing_rad }, &SIGHTING[1..]),
+        Kind::Position => {
+            let [x_m, y_m] = [seen.x, seen.y].map(|axis| axis + SIGHTING[0] * gaussian(random));
+            (Relative::Position { x_m, y_m }, &[SIGHTING[0]; 2])
+        }
+        Kind::Pose => {
+            let sigmas = &[SIGHTING[0], SIGHTING[0], SIGHTING[1]];
+            let error = sigmas.map(|sigma| sigma * gaussian(random));
+            (Relative::Pose(whole.compose(&Pose2::exp(Vector3::from(error)))), sigmas)
+        }
+    };
     let quantity = Quantity::Robot { robot: RobotId(other as u32 + 1), relative };
-    let id = observation(&mut run.robots[observer], observer as u32 + 1, tick, quantity, &SIGHTING);
+    let id = observation(&mut run.robots[observer], observer as u32 + 1, tick, quantity, sigmas);
     let state = run.robots[other].trajectory.at(Timestamp(tick * TICK_NS)).expect("kept");
     let answer = Answer::State { boot: BootIndex(0), state };
     let extension = run.robots[other].extension(tick);
