@@ -263,6 +263,9 @@ impl AgentConfig {
         }
         self.check_relinearization()?;
         self.check_clutter()?;
+        if self.filter.join {
+            self.needs_facts("filter.join")?;
+        }
         if self.sensors.unknown_landmarks == UnknownLandmarks::Map {
             self.needs_facts("sensors.unknown_landmarks = \"map\"")?;
         }

@@ -7,10 +7,10 @@ pub use window::Relinearization;
 pub(crate) use window::fold_blocks;
 
 use crate::fact::{Absolute, Boot, EntryId, Fingerprint, Noise, NominalState, Quantity};
-use crate::sample::Relative;
 use crate::geometry::{Matrix3, Vector2, Vector3};
 use crate::joint::{ErrorForm, Joint, ParameterKind, Participant, Update, clock_influence};
 use crate::measurement::{self, Linearization, Unusable};
+use crate::sample::Relative;
 use crate::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timestamp};
 
 /// Raised whenever the same facts would give other bits.
@@ -445,11 +445,12 @@ fn update(
     odds: Option<f64>,
 ) -> Result<Residual, SkipReason> {
     let threshold = config.gate[at.dimension - 1];
-    let (outcome, nis) = match joint.update(at.dimension, &at.innovation, noise, participants, threshold, odds) {
-        Update::Used { nis } => (Outcome::Used, nis),
-        Update::Rejected { nis, threshold } => (Outcome::Rejected { threshold }, nis),
-        Update::Indefinite => return Err(SkipReason::Noise),
-    };
+    let (outcome, nis) =
+        match joint.update(at.dimension, &at.innovation, noise, participants, threshold, odds) {
+            Update::Used { nis } => (Outcome::Used, nis),
+            Update::Rejected { nis, threshold } => (Outcome::Rejected { threshold }, nis),
+            Update::Indefinite => return Err(SkipReason::Noise),
+        };
     Ok(Residual { outcome, dimension: at.dimension, innovation: at.innovation, nis })
 }
 

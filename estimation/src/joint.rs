@@ -6,8 +6,8 @@ mod covariance;
 mod view;
 
 pub use block::{Block, MappedLandmark, Member, ParameterKind, Parameters};
-pub use component::{Anchor, Component, End, Measured, Tie};
 pub(crate) use component::Placement;
+pub use component::{Anchor, Component, End, Measured, Tie};
 pub use covariance::JointCovariance;
 pub(crate) use covariance::{Prepared, squared};
 pub(crate) use view::{RobotView, clock_influence};
@@ -79,7 +79,13 @@ pub struct Joint {
 impl Joint {
     /// No robot yet.
     pub fn new(form: ErrorForm) -> Self {
-        Self { form, blocks: Vec::new(), covariance: JointCovariance::default(), ties: Vec::new(), updates: 0 }
+        Self {
+            form,
+            blocks: Vec::new(),
+            covariance: JointCovariance::default(),
+            ties: Vec::new(),
+            updates: 0,
+        }
     }
 
     /// In which coordinates the error is Gaussian.
@@ -310,9 +316,10 @@ impl Joint {
         member.nominal = s.compose(&member.nominal);
         member.correction = member.correction.compose(&s.inverse());
         member.folded_noise = unfolded.congruence(&s.adjoint()).scaled(-1.0);
-        member.folded_motion = continuation.last.sensitivity.map_or_else(Matrix3::zeros, |last| {
-            s.adjoint() * (member.folded_motion - last.motion)
-        });
+        member.folded_motion = continuation
+            .last
+            .sensitivity
+            .map_or_else(Matrix3::zeros, |last| s.adjoint() * (member.folded_motion - last.motion));
         member.boot = index;
         if form == ErrorForm::Additive {
             // Its coordinates do not stay put, so that what is carried is folded here, with the gap.
@@ -501,8 +508,7 @@ impl Joint {
             }
             (Block::Robot(member), ErrorForm::Additive) if member.placed => {
                 let pose = member.correction.compose(&member.nominal);
-                let moved =
-                    Pose2::new(pose.x_m() + delta.x, pose.y_m() + delta.y, pose.yaw_rad() + delta.z);
+                let moved = Pose2::new(pose.x_m() + delta.x, pose.y_m() + delta.y, pose.yaw_rad() + delta.z);
                 member.correction = moved.compose(&member.nominal.inverse());
             }
             (Block::Parameters(of), _) => of.value += delta,

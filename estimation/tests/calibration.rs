@@ -60,9 +60,10 @@ fn drawn(seed: u64, what: ParameterKind) -> (Wrong, Calibration) {
     let mut draw = |sigmas: [f64; 3]| sigmas.map(|sigma| sigma * gaussian(&mut random));
     let none = Calibration::default();
     match what {
-        ParameterKind::Motion => {
-            (Wrong { motion: draw(told.motion), ..Wrong::default() }, Calibration { motion: told.motion, ..none })
-        }
+        ParameterKind::Motion => (
+            Wrong { motion: draw(told.motion), ..Wrong::default() },
+            Calibration { motion: told.motion, ..none },
+        ),
         ParameterKind::Mount => {
             (Wrong { mount: draw(told.mount), ..Wrong::default() }, Calibration { mount: told.mount, ..none })
         }

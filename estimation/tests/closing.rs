@@ -23,7 +23,9 @@ fn log(robot: u32, boot: u32, first: i64, bodies: Vec<Body>) -> Vec<Entry> {
         nonce: 0,
         configuration: empty().configuration(),
         nominal: Pose2::identity(),
-        continuation: None, calibration: None });
+        continuation: None,
+        calibration: None,
+    });
     let bodies = std::iter::once(begins).chain(bodies);
     (0..)
         .zip(bodies)

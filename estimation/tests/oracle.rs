@@ -117,14 +117,21 @@ fn restarted(team: &Team, at: Timestamp, gap: Symmetric3, configuration: u64) ->
     let last = state_at(team, at);
     let begin = Pose2::new(-2.0, 7.0, 1.3);
     let s = begin.compose(&last.nominal.inverse());
-    let moved = |state: &NominalState| NominalState::new(s.compose(&state.nominal), state.noise_sum.minus(last.noise_sum).congruence(&s.adjoint()));
+    let moved = |state: &NominalState| {
+        NominalState::new(
+            s.compose(&state.nominal),
+            state.noise_sum.minus(last.noise_sum).congruence(&s.adjoint()),
+        )
+    };
     let boot = Boot {
         // A boot comes before the facts of its own instant, which belong to the one before.
         time: Timestamp(at.0 + 1),
         nonce: 99,
         configuration,
         nominal: begin,
-        continuation: Some(Continuation { previous: BootIndex(0), time: at, last, gap }), calibration: None };
+        continuation: Some(Continuation { previous: BootIndex(0), time: at, last, gap }),
+        calibration: None,
+    };
     let mut second = vec![Body::Boot(boot)];
     second.extend(
         own.iter().filter(|entry| matches!(entry.body, Body::Profile(_))).map(|entry| entry.body.clone()),

@@ -23,7 +23,13 @@ fn open() -> FoldConfig {
 }
 
 fn team(seed: u64, config: &FoldConfig, gps: bool) -> Run {
-    run(seed, 60, config, World { gps, landmarks: &PLACES, ..World::default() }, &[(Wrong::default(), None); 3])
+    run(
+        seed,
+        60,
+        config,
+        World { gps, landmarks: &PLACES, ..World::default() },
+        &[(Wrong::default(), None); 3],
+    )
 }
 
 /// Error of all places together against their covariance, and how many numbers that is.
@@ -151,9 +157,7 @@ fn what_does_not_place_a_landmark_says_so() {
         }
         entry
     };
-    for (config, bearings) in
-        [(open(), true), (FoldConfig { form: ErrorForm::Additive, ..open() }, false)]
-    {
+    for (config, bearings) in [(open(), true), (FoldConfig { form: ErrorForm::Additive, ..open() }, false)] {
         let team = team(2, &config, true);
         let mut ledger = Ledger::new(config);
         for entry in team.entries() {

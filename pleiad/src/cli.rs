@@ -17,7 +17,7 @@ pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
 pub use evaluate::{EvaluateArgs, VariantArg, VariantFilter};
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
-pub use values::{AbsoluteArg, CalibrateArg, ClutterArg, LandmarksArg, RelinearizeArg};
+pub use values::{AbsoluteArg, CalibrateArg, ClutterArg, LandmarksArg, RelinearizeArg, ToldArg};
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
 #[derive(Debug, Parser)]
@@ -123,6 +123,9 @@ pub struct RunArgs {
     /// drift_ppm (of all robots but the first).
     #[arg(long, value_name = "NAME=SIGMA,...")]
     pub calibrate: Option<CalibrateArg>,
+    /// Which robots are told where they start: all, none, or numbers as in 1,2. The others find out.
+    #[arg(long, default_value = "all")]
+    pub told: ToldArg,
     /// A file of fault tables: what goes wrong between the robots and with their processes (docs/faults.md);
     /// those of the scenario itself if absent.
     #[arg(long, value_name = "FILE")]
@@ -161,6 +164,9 @@ pub struct ReplayArgs {
     /// drift_ppm (of all robots but the first).
     #[arg(long, value_name = "NAME=SIGMA,...")]
     pub calibrate: Option<CalibrateArg>,
+    /// Which robots are told where they start: all, none, or numbers as in 1,2. The others find out.
+    #[arg(long, default_value = "all")]
+    pub told: ToldArg,
     /// Which landmarks the robots know: known, none, numbers as in 6,7, or team: none, and the team maps them.
     #[arg(long, default_value = "known")]
     pub landmarks: LandmarksArg,

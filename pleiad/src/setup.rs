@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use pleiad_agent::config::{
-    AgentConfig, AngleNoise, BusSection, CalibrationSection, ClockSection, ErrorName, FilterSection, LandmarkRow, LedgerSection,
-    LengthNoise, MotionSection, OutputSection, PriorSection, RangeBearingNoise, RobotCorrection,
-    SensorsSection, UnknownLandmarks,
+    AgentConfig, AngleNoise, BusSection, CalibrationSection, ClockSection, ErrorName, FilterSection,
+    LandmarkRow, LedgerSection, LengthNoise, MotionSection, OutputSection, PriorSection, RangeBearingNoise,
+    RobotCorrection, SensorsSection, UnknownLandmarks,
 };
 use pleiad_estimation::sample::{Reading, Sample};
 use pleiad_estimation::strategy::StrategyKind;
@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 pub use beside::{MODEL, copy_model, write_beside};
 use beside::{model_for, priors_beside};
 
-use crate::cli::{AbsoluteArg, CalibrateArg, ClutterArg, ErrorArg, LandmarksArg, RelinearizeArg};
+use crate::cli::{AbsoluteArg, CalibrateArg, ClutterArg, ErrorArg, LandmarksArg, RelinearizeArg, ToldArg};
 
 /// Truth is interpolated across holes up to this long.
 pub const TRUTH_GAP_S: f64 = 0.3;
@@ -83,38 +83,55 @@ impl Team {
 }
 
 /// How the filter is to be run, from the command line.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct FilterArgs {
     pub strategy: StrategyKind,
     pub error: ErrorArg,
     pub relinearize: Option<RelinearizeArg>,
     pub clutter: Option<ClutterArg>,
     pub calibrate: Option<CalibrateArg>,
+    /// Who is told where it starts.
+    pub told: ToldArg,
 }
 
 impl FilterArgs {
     /// The exact strategy as it comes.
     pub fn exact(error: ErrorArg) -> Self {
-        Self { strategy: StrategyKind::Exact, error, relinearize: None, clutter: None, calibrate: None }
+        Self {
+            strategy: StrategyKind::Exact,
+            error,
+            relinearize: None,
+            clutter: None,
+            calibrate: None,
+            told: ToldArg::All,
+        }
     }
 }
 
 impl FilterArgs {
-    fn apply(self, filter: &FilterSection) -> FilterSection {
+    fn tells(&self, robot: RobotId) -> bool {
+        match &self.told {
+            ToldArg::All => true,
+            ToldArg::Only(robots) => robots.contains(&robot),
+        }
+    }
+
+    fn apply(&self, filter: &FilterSection) -> FilterSection {
         let error = match self.error {
             ErrorArg::Invariant => ErrorName::Invariant,
             ErrorArg::Additive => ErrorName::Additive,
         };
         let relinearize = self.relinearize.map(|how| how.0).or(filter.relinearize);
         let clutter = self.clutter.map(|clutter| clutter.0).or(filter.clutter);
-        FilterSection { error, gate: filter.gate, clutter, relinearize }
+        let join = filter.join || self.told != ToldArg::All;
+        FilterSection { error, gate: filter.gate, clutter, join, relinearize }
     }
 }
 
 fn configuration(
     robot: RobotId,
     noise: &NoiseFile,
-    filter: FilterArgs,
+    filter: &FilterArgs,
     landmarks: &[LandmarkRow],
 ) -> AgentConfig {
     AgentConfig {
@@ -152,13 +169,13 @@ fn map(recording: &Recording) -> Vec<LandmarkRow> {
 }
 
 /// A simulated team, told what the scenario tells it.
-pub fn simulated(scenario: &Scenario, run: SimulatedRun, filter: FilterArgs) -> Team {
+pub fn simulated(scenario: &Scenario, run: SimulatedRun, filter: &FilterArgs) -> Team {
     let landmarks = map(&run.recording);
     let mut configured = BTreeMap::new();
     for (robot, settings) in &scenario.robots {
         let mut agent = configuration(*robot, &noise_of(settings), filter, &landmarks);
         keep_time(*robot, &mut agent, scenario.robots.keys());
-        agent.prior = run.priors.get(robot).map(agents::prior);
+        agent.prior = run.priors.get(robot).filter(|_| filter.tells(*robot)).map(agents::prior);
         configured.insert(*robot, agent);
     }
     let samples = run.recording.robots.iter().map(|(robot, channels)| (*robot, channels.samples())).collect();
@@ -234,7 +251,7 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
     let mut samples = BTreeMap::new();
     for (robot, channels) in &recording.robots {
         let noise = noise_for(*robot, &recording, options)?;
-        let mut agent = configuration(*robot, &noise, options.filter, &landmarks);
+        let mut agent = configuration(*robot, &noise, &options.filter, &landmarks);
         keep_time(*robot, &mut agent, recording.robots.keys());
         agent.model.clone_from(&model);
         if unknown {
@@ -263,6 +280,9 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
             agent.prior = Some(prior);
         } else {
             notes.push(format!("robot {robot}: no ground truth at any odometry, so no place in the map"));
+        }
+        if !options.filter.tells(*robot) {
+            agent.prior = None;
         }
         for fix in options.absolute.iter().filter(|fix| fix.robot == *robot) {
             agent.sensors.gps = Some(LengthNoise { sigma_m: fix.sigma_m });

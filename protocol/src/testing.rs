@@ -186,7 +186,9 @@ pub fn entry(rng: &mut impl Rng) -> Entry {
                 time: time(rng),
                 last: state(rng),
                 gap: covariance(rng),
-            }), calibration: None }),
+            }),
+            calibration: None,
+        }),
         1 => {
             let dimension = rng.random_range(1..=3);
             Body::Profile(Profile { index: rng.random(), noise: noise(rng, dimension) })

@@ -82,7 +82,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let most =
                     options.most_items.map_or_else(String::new, |items| format!(" --most-items {items}"));
                 let most = if options.relinearize { format!("{most} --relinearize") } else { most };
-            let most = if options.calibrate { format!("{most} --calibrate") } else { most };
+                let most = if options.calibrate { format!("{most} --calibrate") } else { most };
                 let plant = if plant.is_empty() { String::new() } else { format!(" --plant {plant}") };
                 println!(
                     "replay: cargo run -p pleiad-tests --features planted --example schedules -- --seeds {seed}..{}{kind}{most}{plant}",

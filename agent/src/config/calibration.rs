@@ -78,7 +78,11 @@ impl AgentConfig {
     pub(super) fn check_clutter(&self) -> Result<(), ConfigError> {
         let Some(clutter) = &self.filter.clutter else { return Ok(()) };
         if !(clutter.share > 0.0 && clutter.share < 1.0) {
-            return Err(value("filter.clutter.share", clutter.share, "between 0 and 1; without garbage remove the table"));
+            return Err(value(
+                "filter.clutter.share",
+                clutter.share,
+                "between 0 and 1; without garbage remove the table",
+            ));
         }
         positive("filter.clutter.reach_m", clutter.reach_m)?;
         if self.strategy == StrategyKind::Exact { Ok(()) } else { self.needs_facts("filter.clutter") }
@@ -90,7 +94,11 @@ impl AgentConfig {
             Err(ConfigError::Value { key: format!("{key} (beside {beside})"), found, expected })
         };
         if self.strategy != StrategyKind::Exact {
-            return wrong("strategy", format!("\"{}\"", self.strategy), "\"exact\": no other strategy keeps facts");
+            return wrong(
+                "strategy",
+                format!("\"{}\"", self.strategy),
+                "\"exact\": no other strategy keeps facts",
+            );
         }
         if self.filter.error == ErrorName::Additive {
             let expected = "\"invariant\": the additive form has neither parameters nor landmarks of its own";

@@ -31,6 +31,8 @@ pub struct FilterSection {
     /// Some observations are of nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clutter: Option<ClutterSection>,
+    /// Robots without a prior find out where they are from what is seen.
+    pub join: bool,
     /// Facts are linearized together, not each where those before it put the robots.
     pub relinearize: Option<RelinearizeSection>,
 }
@@ -55,7 +57,13 @@ impl Default for RelinearizeSection {
 
 impl Default for FilterSection {
     fn default() -> Self {
-        Self { error: ErrorName::Invariant, gate: DEFAULT_GATE, clutter: None, relinearize: None }
+        Self {
+            error: ErrorName::Invariant,
+            gate: DEFAULT_GATE,
+            clutter: None,
+            join: false,
+            relinearize: None,
+        }
     }
 }
 
@@ -73,7 +81,13 @@ impl FilterSection {
             passes: how.passes,
             cell_ns: cell_s.map_or(0, ns),
         });
-        FoldConfig { form, gate: self.gate, clutter: self.clutter.map(Into::into), relinearize }
+        FoldConfig {
+            form,
+            gate: self.gate,
+            clutter: self.clutter.map(Into::into),
+            join: self.join,
+            relinearize,
+        }
     }
 }
 

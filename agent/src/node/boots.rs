@@ -39,7 +39,14 @@ impl Node {
             (None, Some(prior)) => prior.pose,
             (None, None) => Pose2::identity(),
         };
-        let odom = self.odom_of(&Boot { time, nonce: 0, configuration: 0, nominal, continuation, calibration: None });
+        let odom = self.odom_of(&Boot {
+            time,
+            nonce: 0,
+            configuration: 0,
+            nominal,
+            continuation,
+            calibration: None,
+        });
         self.membership.lost_disk |= self.segments.last().is_none() && index > BootIndex(0);
         self.lived = true;
         self.lived_boots.insert(index);
@@ -69,7 +76,7 @@ impl Node {
             let quantity = Quantity::Absolute(Absolute::Pose(prior.pose));
             let noise = NoiseRef::Explicit(prior.noise);
             self.say(index, Body::Observation(Observation { time, quantity, noise, observer }));
-        } else if continuation.is_none() {
+        } else if continuation.is_none() && !self.config.fold.join {
             self.notice(Notice::NoPrior { boot: index });
         }
     }

@@ -53,8 +53,12 @@ impl Found {
                         ParameterKind::Motion => {
                             [("forward_scale", 1.0), ("yaw_scale", 1.0), ("yaw_rate_bias_rad_s", 1.0)]
                         }
-                        ParameterKind::Mount => [("mount_x_m", 1.0), ("mount_y_m", 1.0), ("mount_yaw_rad", 1.0)],
-                        ParameterKind::Clock => [("clock_offset_s", 1.0), ("clock_drift_ppm", 1e6), ("", 0.0)],
+                        ParameterKind::Mount => {
+                            [("mount_x_m", 1.0), ("mount_y_m", 1.0), ("mount_yaw_rad", 1.0)]
+                        }
+                        ParameterKind::Clock => {
+                            [("clock_offset_s", 1.0), ("clock_drift_ppm", 1e6), ("", 0.0)]
+                        }
                     };
                     for (axis, (name, unit)) in names.into_iter().enumerate() {
                         let variance = covariance[(axis, axis)];
@@ -82,7 +86,7 @@ impl Found {
                         sigma_y_m: spread[(1, 1)].max(0.0).sqrt(),
                     });
                 }
-                Block::Robot(_) | Block::Free => {}
+                Block::Robot(_) | Block::Anchor(_) | Block::Free => {}
             }
         }
         found.parameters.sort_by_key(|parameter| parameter.robot);

@@ -181,7 +181,9 @@ pub fn standing_log(robot: u32, fold: FoldConfig, saw: &[(f64, u32)]) -> Vec<Ent
         nonce: 1,
         configuration: fold.hash(),
         nominal: Pose2::identity(),
-        continuation: None, calibration: None };
+        continuation: None,
+        calibration: None,
+    };
     let noise = NoiseRef::Explicit(Noise::from_sigmas(&[0.1, 0.1, 0.05]));
     let observation = |time_s: f64, quantity| {
         Body::Observation(Observation { time: seconds(time_s), quantity, noise, observer: still })

@@ -154,7 +154,11 @@ mod tests {
             noise: NoiseRef::Explicit(Noise::from_sigmas(&[0.1])),
             observer,
         });
-        Entry { id: EntryId { robot: RobotId(1), boot: BootIndex(0), sequence: Sequence(3) }, body, extension }
+        Entry {
+            id: EntryId { robot: RobotId(1), boot: BootIndex(0), sequence: Sequence(3) },
+            body,
+            extension,
+        }
     }
 
     fn read(extension: Vec<u8>) -> Option<Sensitivity> {

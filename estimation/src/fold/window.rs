@@ -9,7 +9,9 @@
 //! So a motion common to the team stays in the null space of every relative measurement, wherever each of them is
 //! linearized.
 
-use crate::fold::{across, Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, Taken, fold, linearize, taken};
+use crate::fold::{
+    Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, Taken, across, fold, linearize, taken,
+};
 use crate::geometry::{Matrix3, Vector3};
 use crate::joint::{Block, ErrorForm, Joint, Participant, Prepared};
 use crate::measurement::{self, Linearization};
@@ -164,8 +166,8 @@ fn fold_stretch(
 ) {
     let events: Vec<Result<Event<'_>, SkipReason>> =
         facts.iter().map(|(key, fact)| event(joint, key, fact)).collect();
-    let points = (1..how.passes)
-        .fold(None, |points, _| Some(smoothed(joint, config, &events, points.as_ref())));
+    let points =
+        (1..how.passes).fold(None, |points, _| Some(smoothed(joint, config, &events, points.as_ref())));
     let mut pass = Pass::new(joint.clone(), points.as_ref());
     for (index, event) in events.iter().enumerate().take(count) {
         let at = points.as_ref().map(|points| points.events[index].as_slice());
@@ -228,7 +230,8 @@ fn smoothed(
             }
         }
     }
-    let parameters = joint.blocks().iter().enumerate().filter(|(_, block)| matches!(block, Block::Parameters(_)));
+    let parameters =
+        joint.blocks().iter().enumerate().filter(|(_, block)| matches!(block, Block::Parameters(_)));
     let parameters = parameters.filter_map(|(index, _)| {
         let moved = [0, 1, 2].map(|axis| along(&joint.covariance().row(3 * index + axis), &adjoint));
         let value = begun.joint.parameters_at(index)?.value + begun.means[index] - Vector3::from(moved);
@@ -266,8 +269,12 @@ impl Pass {
         at: Option<&[Pose2]>,
         last: bool,
     ) -> (Residual, Trace) {
-        let mut trace =
-            Trace { at: Vec::with_capacity(2), couplings: Vec::new(), rows: Vec::with_capacity(2), update: None };
+        let mut trace = Trace {
+            at: Vec::with_capacity(2),
+            couplings: Vec::new(),
+            rows: Vec::with_capacity(2),
+            update: None,
+        };
         for (which, (index, state)) in event.participants.iter().enumerate() {
             if let Some((row, by)) =
                 state.as_ref().and_then(|state| self.joint.move_by_parameters(*index, state))
@@ -299,8 +306,7 @@ impl Pass {
             Ok(linearized) => linearized,
             Err(reason) => return (Residual::without_measurement(Outcome::Skipped(reason)), trace),
         };
-        let participants =
-            super::participants(event.quantity, &event.participants, &influences, &linearized);
+        let participants = super::participants(event.quantity, &event.participants, &influences, &linearized);
         let mut innovation = linearized.innovation;
         for Participant { index, jacobian } in &participants {
             innovation -= jacobian * self.means[*index];
@@ -338,7 +344,9 @@ impl Pass {
             if at.is_none() {
                 match prepare(&(noise / weight.max(LEAST_WEIGHT))) {
                     Some(softer) => prepared = softer,
-                    None => return (Residual::without_measurement(Outcome::Skipped(SkipReason::Noise)), trace),
+                    None => {
+                        return (Residual::without_measurement(Outcome::Skipped(SkipReason::Noise)), trace);
+                    }
                 }
             }
         }

@@ -254,7 +254,9 @@ impl Localizer {
         let said = |landmark: &MappedLandmark| sighting.recognition[landmark.kind.0];
         let possible = || self.map.landmarks.iter().enumerate().filter(|(_, landmark)| said(landmark) > 0.0);
         for (index, hypothesis) in self.hypotheses.iter().enumerate() {
-            let Some((pose, _)) = hypothesis.joint.estimate(ROBOT, Timestamp(0), &sighting.observer) else { continue };
+            let Some((pose, _)) = hypothesis.joint.estimate(ROBOT, Timestamp(0), &sighting.observer) else {
+                continue;
+            };
             let covariance = hypothesis.joint.covariance().block(0, 0);
             for (_, of) in possible() {
                 let Ok(linearization) = of_point(&sighting.relative, &pose, of.position_m) else { continue };
@@ -317,7 +319,12 @@ pub(super) fn joint_at(pose: &Pose2, covariance: &Matrix3, at: &NominalState, up
     let correction = pose.compose(&at.nominal.inverse());
     let member = Member::new(ROBOT, BOOT, correction, at.nominal, at.noise_sum);
     let Symmetric3(lower) = Symmetric3::from_lower(covariance);
-    let parts = JointParts { blocks: vec![(Block::Robot(member), true)], lower: lower.to_vec(), ties: Vec::new(), updates };
+    let parts = JointParts {
+        blocks: vec![(Block::Robot(member), true)],
+        lower: lower.to_vec(),
+        ties: Vec::new(),
+        updates,
+    };
     // A robot's block has six entries: there is nothing that could not fit.
     Joint::from_parts(ErrorForm::Invariant, parts).unwrap_or_else(|| Joint::new(ErrorForm::Invariant))
 }

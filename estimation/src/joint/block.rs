@@ -106,11 +106,8 @@ impl Block {
         let pose = |pose: &Pose2| [pose.x_m(), pose.y_m(), pose.yaw_rad()].map(f64::to_bits);
         match self {
             Self::Robot(member) => {
-                let mut words = vec![
-                    u64::from(member.robot.0),
-                    u64::from(member.boot.0),
-                    u64::from(member.placed),
-                ];
+                let mut words =
+                    vec![u64::from(member.robot.0), u64::from(member.boot.0), u64::from(member.placed)];
                 words.extend(pose(&member.correction));
                 words.extend(member.folded_noise.0.map(f64::to_bits));
                 words.extend(outside(member.component));

@@ -51,7 +51,8 @@ impl Prepared {
 
     /// With `V` multiplied by a factor.
     pub(crate) fn scaled(&self, factor: f64) -> Self {
-        let columns = self.columns.each_ref().map(|column| column.iter().map(|entry| entry * factor).collect());
+        let columns =
+            self.columns.each_ref().map(|column| column.iter().map(|entry| entry * factor).collect());
         Self { columns, ..*self }
     }
 

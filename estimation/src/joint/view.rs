@@ -37,8 +37,7 @@ impl Joint {
             return None;
         }
         let kinds = [ParameterKind::Motion, ParameterKind::Clock];
-        let rows: Vec<usize> =
-            kinds.iter().filter_map(|kind| self.parameter_index(robot, *kind)).collect();
+        let rows: Vec<usize> = kinds.iter().filter_map(|kind| self.parameter_index(robot, *kind)).collect();
         let parameters = rows.iter().enumerate().filter_map(|(place, row)| {
             let of = *self.parameters_at(*row)?;
             let with_robot = self.covariance().block(*row, index);
@@ -60,9 +59,10 @@ impl Joint {
 impl RobotView {
     /// The correction that holds at `state` of the nominal trajectory: `time` is what the robot's clock shows.
     pub(crate) fn correction_at(&self, time: Timestamp, state: &NominalState) -> Pose2 {
-        let moved = self.influences(time, state).iter().fold(Vector3::zeros(), |sum, (uncertain, by)| {
-            sum + by * uncertain.of.value
-        });
+        let moved = self
+            .influences(time, state)
+            .iter()
+            .fold(Vector3::zeros(), |sum, (uncertain, by)| sum + by * uncertain.of.value);
         if moved == Vector3::zeros() { self.correction } else { Pose2::exp(moved).compose(&self.correction) }
     }
 

@@ -183,7 +183,12 @@ fn entries() -> Vec<Entry> {
         entries.push(Entry { id, body, extension: Vec::new() });
         id
     };
-    let state = |robot: u32, second: u32| NominalState::new(Pose2::new(f64::from(second), 3.0 * f64::from(robot), 0.1 * f64::from(second * robot)), Symmetric3::zero());
+    let state = |robot: u32, second: u32| {
+        NominalState::new(
+            Pose2::new(f64::from(second), 3.0 * f64::from(robot), 0.1 * f64::from(second * robot)),
+            Symmetric3::zero(),
+        )
+    };
     let observation = |second: u32, quantity, noise: &[f64], observer| {
         Body::Observation(Observation {
             time: Timestamp::from_seconds(f64::from(second)),
@@ -199,7 +204,9 @@ fn entries() -> Vec<Entry> {
             nonce: 0,
             configuration: 0,
             nominal: start.nominal,
-            continuation: None, calibration: None };
+            continuation: None,
+            calibration: None,
+        };
         push(robot, 0, Body::Boot(boot));
         let prior = Quantity::Absolute(Absolute::Pose(start.nominal));
         push(robot, 1, observation(0, prior, &[0.1, 0.1, 0.1], start));

@@ -236,7 +236,8 @@ impl Run {
         }
         estimate.boot = index;
         estimate.correction = estimate.correction.compose(&shift.inverse());
-        estimate.last = NominalState::new(boot.nominal, Symmetric3::from_lower(&-(ad * owed * ad.transpose())));
+        estimate.last =
+            NominalState::new(boot.nominal, Symmetric3::from_lower(&-(ad * owed * ad.transpose())));
         let body = error_from_body(self.form, &estimate.pose());
         self.covariance.add(robot, &(body * continuation.gap.to_matrix() * body.transpose()));
         self.team.insert(robot, Member::Placed(estimate));

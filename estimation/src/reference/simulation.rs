@@ -194,7 +194,9 @@ impl Logs {
             nonce: 1,
             configuration: 0,
             nominal: Pose2::identity(),
-            continuation: None, calibration: None };
+            continuation: None,
+            calibration: None,
+        };
         self.boot(robot, boot, 0)
     }
 

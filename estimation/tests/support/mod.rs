@@ -166,7 +166,9 @@ fn start(index: u32, options: &Options, random: &mut ChaCha8Rng) -> Robot {
         nonce: random.random(),
         configuration: options.config.hash(),
         nominal: prior,
-        continuation: None, calibration: None };
+        continuation: None,
+        calibration: None,
+    };
     let id = index + 1;
     robot.push(id, Body::Boot(boot));
     let profiles = SIGMAS.iter().map(|sigmas| Noise::from_sigmas(sigmas));

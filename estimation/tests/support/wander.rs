@@ -105,7 +105,15 @@ pub enum Kind {
 
 impl Default for World<'_> {
     fn default() -> Self {
-        Self { gps: true, landmarks: &[], garbage: 0.0, slip: 1.0, every: 4, told: u32::MAX, kind: Kind::RangeBearing }
+        Self {
+            gps: true,
+            landmarks: &[],
+            garbage: 0.0,
+            slip: 1.0,
+            every: 4,
+            told: u32::MAX,
+            kind: Kind::RangeBearing,
+        }
     }
 }
 
@@ -139,8 +147,7 @@ pub fn run(
             steps.push(said);
         }
         let nominal = NominalTrajectory::new(Timestamp(0), Pose2::identity(), usize::MAX).calibrated();
-        let mut robot =
-            Robot { wrong: *wrong, told: *told, truth, trajectory: nominal, entries: Vec::new() };
+        let mut robot = Robot { wrong: *wrong, told: *told, truth, trajectory: nominal, entries: Vec::new() };
         let first = BEFORE - wrong.late_ticks;
         for tick in 0..ticks + 1 {
             let [x, y, yaw] = NOISE.map(|sigma| (world.slip * sigma).powi(2) * TICK_S);

@@ -52,6 +52,30 @@ impl FromStr for RelinearizeArg {
     }
 }
 
+/// `all`, `none`, or a list of numbers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ToldArg {
+    All,
+    Only(Vec<RobotId>),
+}
+
+impl FromStr for ToldArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "all" => Ok(Self::All),
+            "none" => Ok(Self::Only(Vec::new())),
+            list => list
+                .split(',')
+                .map(|id| id.trim().parse().map(RobotId))
+                .collect::<Result<_, _>>()
+                .map(Self::Only)
+                .map_err(|_| format!("found {text:?}, expected all, none, or numbers as in 1,2")),
+        }
+    }
+}
+
 /// `SHARE:REACH_M`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClutterArg(pub ClutterSection);

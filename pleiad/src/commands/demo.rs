@@ -112,7 +112,7 @@ fn run_case(args: &DemoArgs, name: &str, text: &str, out: &Path) -> anyhow::Resu
     let scenario = Scenario::load(&path)?;
     let world = simulate(&scenario, args.seed)?;
     let filter = FilterArgs::exact(ErrorArg::Invariant);
-    let mut team = setup::simulated(&scenario, world, filter);
+    let mut team = setup::simulated(&scenario, world, &filter);
     team.notes.extend(cut_off(&team));
     let options = ProcessOptions {
         feeder: Feeder::Scenario { path: &path, seed: args.seed },

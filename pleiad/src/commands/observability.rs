@@ -79,7 +79,7 @@ pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
             scenario.duration_s = seconds;
         }
         let run = simulate(&scenario, args.seed.unwrap_or(scenario.seed))?;
-        setup::simulated(&scenario, run, filter)
+        setup::simulated(&scenario, run, &filter)
     };
     let result = runner::in_process(&team, "observing")?;
     let json = describe(args, &of_run(&result)?, &team);

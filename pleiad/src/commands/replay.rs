@@ -97,6 +97,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
             relinearize: args.relinearize,
             clutter: args.clutter,
             calibrate: args.calibrate,
+            told: args.told.clone(),
         },
         landmarks: &args.landmarks,
         absolute: &args.absolute,
@@ -233,7 +234,8 @@ fn summary(
 
 /// What is not known beforehand and nobody asks for is left out.
 fn found(recording: &Recording, result: &RunResult) -> Option<FoundJson> {
-    let found = result.robots.values().map(|own| &own.summary.found).max_by_key(|found| found.landmarks.len())?;
+    let found =
+        result.robots.values().map(|own| &own.summary.found).max_by_key(|found| found.landmarks.len())?;
     if *found == Found::default() {
         return None;
     }

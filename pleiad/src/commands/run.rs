@@ -22,13 +22,14 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     let seed = args.seed.unwrap_or(scenario.seed);
     let world = simulate(&scenario, seed)?;
     let filter = FilterArgs {
-            strategy: args.strategy,
-            error: args.error,
-            relinearize: args.relinearize,
-            clutter: args.clutter,
-            calibrate: args.calibrate,
-        };
-    let team = setup::simulated(&scenario, world, filter);
+        strategy: args.strategy,
+        error: args.error,
+        relinearize: args.relinearize,
+        clutter: args.clutter,
+        calibrate: args.calibrate,
+        told: args.told.clone(),
+    };
+    let team = setup::simulated(&scenario, world, &filter);
     let file = args.faults.as_ref().or_else(|| (!scenario.faults.rules.is_empty()).then_some(&args.scenario));
     let faults = file.map(|file| faults(file, &team, seed)).transpose()?;
     let out = folder::create(args.out.as_deref(), &scenario.name)?;

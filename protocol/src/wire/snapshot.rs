@@ -3,7 +3,8 @@
 use pleiad_estimation::fact::{ClockMap, Entry, EntryId, Fingerprint, LogId, Noise, Seal, Vote};
 use pleiad_estimation::geometry::Matrix3;
 use pleiad_estimation::joint::{
-    Block, ErrorForm, Joint, JointParts, MappedLandmark, Member, ParameterKind, Parameters,
+    Anchor, Block, Component, End, ErrorForm, Joint, JointParts, MappedLandmark, Measured, Member,
+    ParameterKind, Parameters, Tie,
 };
 use pleiad_estimation::ledger::{Checkpoint, FactCounts, LogBase, Term, Views};
 use pleiad_estimation::symmetric::Symmetric3;
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::check::{self, WirePose, WireSymmetric};
 use super::entry::{WireEntry, WireId, WireLog, WireNoise};
 use super::membership::{WireSeal, WireVote};
+use super::sample::WireRelative;
 use crate::codec::{self, Reader};
 use crate::error::ProtocolError;
 use crate::limits;
@@ -79,14 +81,36 @@ struct WireMember {
     folded_noise: WireSymmetric,
     /// By columns; none if nothing was ever folded.
     folded_motion: Option<[f64; 9]>,
+    component: WireComponent,
     placed: bool,
+}
+
+/// Who began a frame, and when; none is the map.
+type WireComponent = Option<(i64, u32)>;
+
+#[derive(Serialize, Deserialize)]
+enum WireEnd {
+    Map,
+    Point([f64; 2]),
+    Anchor(u32),
+}
+
+#[derive(Serialize, Deserialize)]
+struct WireTie {
+    time_ns: i64,
+    ends: [WireEnd; 2],
+    /// None is a heading.
+    relative: Option<WireRelative>,
+    heading: f64,
+    noise: WireSymmetric,
 }
 
 #[derive(Serialize, Deserialize)]
 enum WireBlock {
     Robot(WireMember),
     Parameters { robot: u32, kind: WireParameters, value: [f64; 3], since_ns: i64 },
-    Landmark(u32, WirePose),
+    Landmark(u32, WirePose, WireComponent),
+    Anchor(WirePose, WireComponent),
     Free,
 }
 
@@ -152,6 +176,7 @@ impl TryFrom<WireMember> for (Member, bool) {
             }
             member.folded_motion = Matrix3::from_column_slice(&columns);
         }
+        member.component = component(wire.component);
         Ok((member, wire.placed))
     }
 }
@@ -177,13 +202,64 @@ impl TryFrom<WireBlock> for (Block, bool) {
                 let (robot, since) = (RobotId(robot), Timestamp(since_ns));
                 (Block::Parameters(Parameters { robot, kind, value: value.into(), since }), false)
             }
-            WireBlock::Landmark(landmark, pose) => {
-                let pose = check::pose("landmark", pose)?;
-                (Block::Landmark(MappedLandmark { landmark: LandmarkId(landmark), pose }), false)
+            WireBlock::Landmark(landmark, pose, of) => {
+                let (pose, component) = (check::pose("landmark", pose)?, component(of));
+                (Block::Landmark(MappedLandmark { landmark: LandmarkId(landmark), pose, component }), false)
+            }
+            WireBlock::Anchor(pose, of) => {
+                let (pose, component) = (check::pose("anchor", pose)?, component(of));
+                (Block::Anchor(Anchor { pose, component }), false)
             }
             WireBlock::Free => (Block::Free, false),
         })
     }
+}
+
+fn component(wire: WireComponent) -> Component {
+    wire.map_or(Component::MAP, |(since_ns, robot)| Component::new(Timestamp(since_ns), RobotId(robot)))
+}
+
+fn wire_component(component: Component) -> WireComponent {
+    let (since, robot) = component.origin();
+    (component != Component::MAP).then_some((since.0, robot.0))
+}
+
+impl TryFrom<WireTie> for Tie {
+    type Error = ProtocolError;
+
+    fn try_from(wire: WireTie) -> Result<Self, ProtocolError> {
+        let end = |end: WireEnd| {
+            Ok(match end {
+                WireEnd::Map => End::Map,
+                WireEnd::Point(place) => End::Point(check::pair("tie.place", place)?),
+                WireEnd::Anchor(index) => End::Anchor(index as usize),
+            })
+        };
+        let [one, other] = wire.ends;
+        let measured = match wire.relative {
+            Some(relative) => Measured::Relative(relative.try_into()?),
+            None => Measured::Heading(check::number("tie.heading", wire.heading)?),
+        };
+        for entry in wire.noise {
+            check::number("tie.noise", entry)?;
+        }
+        let ends = [end(one)?, end(other)?];
+        Ok(Self { time: Timestamp(wire.time_ns), ends, measured, noise: Symmetric3(wire.noise) })
+    }
+}
+
+fn wire_tie(tie: &Tie) -> WireTie {
+    let end = |end: &End| match end {
+        End::Map => WireEnd::Map,
+        End::Point(place) => WireEnd::Point(*place),
+        #[allow(clippy::cast_possible_truncation, reason = "a team has fewer blocks")]
+        End::Anchor(index) => WireEnd::Anchor(*index as u32),
+    };
+    let (relative, heading) = match &tie.measured {
+        Measured::Relative(relative) => (Some(relative.into()), 0.0),
+        Measured::Heading(heading) => (None, *heading),
+    };
+    WireTie { time_ns: tie.time.0, ends: tie.ends.each_ref().map(end), relative, heading, noise: tie.noise.0 }
 }
 
 fn wire_block(block: &Block, placed: bool) -> WireBlock {
@@ -198,6 +274,7 @@ fn wire_block(block: &Block, placed: bool) -> WireBlock {
                 folded_noise: member.folded_noise.0,
                 folded_motion: (motion != Matrix3::zeros())
                     .then(|| std::array::from_fn(|entry| motion[entry])),
+                component: wire_component(member.component),
                 placed,
             })
         }
@@ -211,7 +288,14 @@ fn wire_block(block: &Block, placed: bool) -> WireBlock {
             value: of.value.into(),
             since_ns: of.since.0,
         },
-        Block::Landmark(mapped) => WireBlock::Landmark(mapped.landmark.0, check::wire_pose(&mapped.pose)),
+        Block::Landmark(mapped) => WireBlock::Landmark(
+            mapped.landmark.0,
+            check::wire_pose(&mapped.pose),
+            wire_component(mapped.component),
+        ),
+        Block::Anchor(anchor) => {
+            WireBlock::Anchor(check::wire_pose(&anchor.pose), wire_component(anchor.component))
+        }
         Block::Free => WireBlock::Free,
     }
 }
@@ -294,11 +378,9 @@ pub fn encode(checkpoint: &Checkpoint) -> Vec<u8> {
         counts: checkpoint.counts.numbers().map(|count| count as u64),
     };
     codec::put(&mut bytes, &head);
-    codec::put_list(
-        &mut bytes,
-        parts.blocks.iter().map(|(block, placed)| wire_block(block, *placed)),
-    );
+    codec::put_list(&mut bytes, parts.blocks.iter().map(|(block, placed)| wire_block(block, *placed)));
     codec::put_list(&mut bytes, parts.lower.iter().map(|entry| WireNumber(*entry)));
+    codec::put_list(&mut bytes, parts.ties.iter().map(wire_tie));
     let logs = checkpoint.logs.iter();
     codec::put_list(
         &mut bytes,
@@ -349,9 +431,10 @@ pub fn decode(bytes: &[u8]) -> Result<Checkpoint, ProtocolError> {
     let most = limits::SNAPSHOT_ITEMS;
     let blocks = reader.list::<WireBlock, _>("snapshot.blocks", most)?;
     let lower = reader.list::<WireNumber, f64>("snapshot.covariance", most)?;
+    let ties = reader.list::<WireTie, Tie>("snapshot.ties", most)?;
     let found = lower.len() as u64;
     let form = if head.additive { ErrorForm::Additive } else { ErrorForm::Invariant };
-    let parts = JointParts { blocks, lower, updates: head.updates };
+    let parts = JointParts { blocks, lower, ties, updates: head.updates };
     let limit = (3 * parts.blocks.len() * (3 * parts.blocks.len() + 1) / 2) as u64;
     let joint = Joint::from_parts(form, parts).ok_or(ProtocolError::TooMany {
         field: "snapshot.covariance".into(),

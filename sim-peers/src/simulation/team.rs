@@ -35,15 +35,26 @@ pub fn config(plan: &Plan, robot: u32, start: &Pose2) -> Result<NodeConfig, Stri
     let mut landmarks = "landmarks = [{ id = 7, x_m = 3.0, y_m = -4.0 }]\n";
     let mut unknown = "";
     if plan.calibrate {
+        filter.push_str("join = true\n");
         filter.push_str("clutter = { share = 0.05, reach_m = 30.0 }\n");
         filter.push_str("[calibration]\nsigma_forward_scale = 0.05\nsigma_yaw_scale = 0.05\n");
         filter.push_str("sigma_mount_m = 0.05\nsigma_mount_rad = 0.02\nsigma_clock_offset_s = 0.02\n");
         (landmarks, unknown) = ("", "unknown_landmarks = 'map'\n");
     }
+    // Where robots are to find out where they are, the first alone is told.
+    let prior = if plan.calibrate && robot > 1 {
+        String::new()
+    } else {
+        format!(
+            "prior = {{ x_m = {:?}, y_m = {:?}, heading_rad = {:?}, sigma_position_m = 0.1, sigma_heading_rad = 0.05 }}\n",
+            start.x_m(),
+            start.y_m(),
+            start.yaw_rad()
+        )
+    };
     let text = format!(
         "team = 'simulation'\nrobot = {robot}\n\
-         prior = {{ x_m = {:?}, y_m = {:?}, heading_rad = {:?}, sigma_position_m = 0.1, sigma_heading_rad = 0.05 }}\n\
-         {landmarks}{filter}[ledger]\n{ledger}{most}late_s = 0.5\nrebase_m = {:?}\n\
+         {prior}{landmarks}{filter}[ledger]\n{ledger}{most}late_s = 0.5\nrebase_m = {:?}\n\
          [motion]\nlongest_gap_s = 1.0\n\
          [sensors]\n{unknown}\
          relative_pose = {{ sigma_position_m = 0.05, sigma_yaw_rad = 0.02 }}\n\
@@ -51,9 +62,6 @@ pub fn config(plan: &Plan, robot: u32, start: &Pose2) -> Result<NodeConfig, Stri
          range_bearing = {{ sigma_range_m = 0.08, sigma_bearing_rad = 0.04 }}\n\
          gps = {{ sigma_m = 0.5 }}\n\
          [output]\nestimate_rate_hz = 1.0\n",
-        start.x_m(),
-        start.y_m(),
-        start.yaw_rad(),
         plan.rebase_m,
     );
     let config: AgentConfig = toml::from_str(&text).map_err(|error| error.to_string())?;

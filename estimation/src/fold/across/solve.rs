@@ -21,11 +21,13 @@ const WORST_HEADING: f64 = 0.1;
 const WORST_SHARE: f64 = 0.25;
 /// Another minimum so much less likely is none.
 const COST_APART: f64 = 12.0;
+/// Where some ties may be of nothing, so many numbers beyond three must agree.
+const REDUNDANCY_IN_CLUTTER: usize = 5;
 /// Minima that are no farther apart are one.
 const SAME_M: f64 = 0.3;
 const SAME_RAD: f64 = 0.1;
 /// So many different minima are looked at more closely.
-const MOST_MINIMA: usize = 4;
+const MOST_MINIMA: usize = 8;
 
 /// One answer, and it is good enough.
 pub(super) struct Solution {
@@ -69,9 +71,10 @@ pub(super) fn solve(
     let mut problem = Problem { joint, stays, moves, ties };
     // One tie in three may be of nothing.
     let spare = problem.ties.len() / 3;
+    let wanted = if config.clutter.is_some() { REDUNDANCY_IN_CLUTTER } else { 0 };
     for _ in 0..=spare {
+        let redundancy = problem.dimension().checked_sub(3).filter(|redundancy| *redundancy >= wanted)?;
         let (best, placement) = problem.only_minimum()?;
-        let redundancy = problem.dimension().saturating_sub(3);
         if redundancy == 0 || best.cost <= chi_square_999(redundancy) || !config.gate[0].is_finite() {
             return Some(Solution { placement, redundancy });
         }
@@ -95,7 +98,8 @@ impl Problem<'_> {
         if self.dimension() < 3 {
             return None;
         }
-        let posed = self.ties.iter().any(|(_, tie)| matches!(tie.measured, Measured::Relative(Relative::Pose(_))));
+        let posed =
+            self.ties.iter().any(|(_, tie)| matches!(tie.measured, Measured::Relative(Relative::Pose(_))));
         let mut rough: Vec<Minimum> =
             self.starts().into_iter().filter_map(|start| self.descend(start)).collect();
         rough.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -106,11 +110,18 @@ impl Problem<'_> {
                 distinct.push(minimum);
             }
         }
-        let mut exact: Vec<(Minimum, Placement)> =
-            distinct.into_iter().filter_map(|minimum| self.polish(minimum.transform)).collect();
+        // One that does not come to rest is no answer, but it may be in the way of one.
+        let mut exact: Vec<(Minimum, Option<Placement>)> = distinct
+            .into_iter()
+            .map(|rough| match self.polish(rough.transform) {
+                Some((minimum, placement)) => (minimum, Some(placement)),
+                None => (rough, None),
+            })
+            .collect();
         exact.sort_by(|(a, _), (b, _)| a.cost.total_cmp(&b.cost));
         let mut exact = exact.into_iter();
         let (best, placement) = exact.next()?;
+        let placement = placement?;
         let rival = exact.any(|(other, _)| {
             other.cost < best.cost + COST_APART && self.are_apart(&best.transform, &other.transform)
         });
@@ -187,7 +198,9 @@ impl Problem<'_> {
                 let at = measurement::of_robot(relative, &from, &to).ok()?;
                 (at, [-1.0, 1.0])
             }
-            Measured::Heading(heading) => (measurement::of_map(&Absolute::Heading(*heading), &to), [0.0, 1.0]),
+            Measured::Heading(heading) => {
+                (measurement::of_map(&Absolute::Heading(*heading), &to), [0.0, 1.0])
+            }
         };
         let moved = self.moved_end(tie);
         let adjoint = transform.adjoint();
@@ -275,7 +288,9 @@ impl Problem<'_> {
             }
             let factor = Factor::new(w)?;
             let stacked = |of: &dyn Fn(&Row, usize) -> f64| -> Vec<f64> {
-                rows.iter().flat_map(|row| (0..row.at.dimension).map(|k| of(row, k)).collect::<Vec<_>>()).collect()
+                rows.iter()
+                    .flat_map(|row| (0..row.at.dimension).map(|k| of(row, k)).collect::<Vec<_>>())
+                    .collect()
             };
             let whitened = factor.forward(&stacked(&|row, k| row.at.innovation[k]));
             let columns = [0, 1, 2].map(|axis| factor.forward(&stacked(&|row, k| row.through[(k, axis)])));
@@ -318,8 +333,7 @@ impl Problem<'_> {
     /// `P Hx^T`, by columns.
     fn gains(&self, rows: &[Row], offsets: &[usize]) -> Vec<Vec<f64>> {
         let covariance = self.joint.covariance();
-        let mut columns =
-            vec![vec![0.0; covariance.size()]; rows.iter().map(|row| row.at.dimension).sum()];
+        let mut columns = vec![vec![0.0; covariance.size()]; rows.iter().map(|row| row.at.dimension).sum()];
         for (row, offset) in rows.iter().zip(offsets) {
             for (index, by) in &row.blocks {
                 for axis in 0..3 {
@@ -383,9 +397,8 @@ impl Problem<'_> {
 
     /// The tie that says most about a place, and where it may have seen what it saw, in the frame it sees from.
     fn seed(&self) -> Option<(&Tie, Vec<Vector2>)> {
-        let polar = |range: f64, bearing: f64| {
-            Vector2::new(range * libm::cos(bearing), range * libm::sin(bearing))
-        };
+        let polar =
+            |range: f64, bearing: f64| Vector2::new(range * libm::cos(bearing), range * libm::sin(bearing));
         let points = |tie: &Tie| match &tie.measured {
             Measured::Relative(Relative::Position { x_m, y_m }) => vec![Vector2::new(*x_m, *y_m)],
             Measured::Relative(Relative::RangeBearing { range_m, bearing_rad }) => {

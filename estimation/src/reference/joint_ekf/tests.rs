@@ -228,8 +228,14 @@ fn facts_of_robots_without_a_place_or_of_another_boot_are_skipped() {
     let itself = logs.observation(ONE, at(1.5), range(ONE), explicit(&[0.1]), origin, Some(origin));
     let heading = Quantity::Absolute(Absolute::Heading(0.0));
     let misfit = logs.observation(ONE, at(1.6), heading, explicit(&[0.1, 0.1]), origin, None);
-    let restart =
-        Boot { time: at(2.0), nonce: 2, configuration: 0, nominal: Pose2::identity(), continuation: None, calibration: None };
+    let restart = Boot {
+        time: at(2.0),
+        nonce: 2,
+        configuration: 0,
+        nominal: Pose2::identity(),
+        continuation: None,
+        calibration: None,
+    };
     logs.boot(ONE, restart, 1);
     let stale = logs.observation(ONE, at(3.0), heading, explicit(&[0.1]), origin, None);
     let estimate = fold(ErrorForm::Invariant, &logs);
@@ -271,7 +277,12 @@ fn split_run(gap: Symmetric3) -> (Logs, Logs) {
         Quantity::Robot { robot: TWO, relative: Relative::RangeBearing { range_m: 4.1, bearing_rad: 0.3 } };
     let fix = Quantity::Absolute(Absolute::Position([2.3, 0.6]));
     // N and C of robot one at 1 s, at the break, and at 3 s; robot two stands still.
-    let state = |x: f64, y: f64, yaw: f64, c: f64| NominalState::new(Pose2::new(x, y, yaw), Symmetric3([c, 0.1 * c, 1.5 * c, 0.05 * c, -0.1 * c, 0.2 * c]));
+    let state = |x: f64, y: f64, yaw: f64, c: f64| {
+        NominalState::new(
+            Pose2::new(x, y, yaw),
+            Symmetric3([c, 0.1 * c, 1.5 * c, 0.05 * c, -0.1 * c, 0.2 * c]),
+        )
+    };
     let (early, broken, late) =
         (state(0.8, 0.1, 0.2, 0.01), state(1.5, 0.4, 0.5, 0.02), state(2.2, 0.9, 0.8, 0.035));
     let begin = || {
@@ -290,11 +301,21 @@ fn split_run(gap: Symmetric3) -> (Logs, Logs) {
     let nominal = shift.compose(&broken.nominal);
     split.boot(
         ONE,
-        Boot { time: at(2.0), nonce: 2, configuration: 0, nominal, continuation: Some(continuation), calibration: None },
+        Boot {
+            time: at(2.0),
+            nonce: 2,
+            configuration: 0,
+            nominal,
+            continuation: Some(continuation),
+            calibration: None,
+        },
         1,
     );
     let ad = adjoint(&shift);
-    let observer = NominalState::new(shift.compose(&late.nominal), late.noise_sum.minus(broken.noise_sum).congruence(&ad));
+    let observer = NominalState::new(
+        shift.compose(&late.nominal),
+        late.noise_sum.minus(broken.noise_sum).congruence(&ad),
+    );
     let observation = Observation { time: at(3.0), quantity: fix, noise: explicit(&[0.1, 0.1]), observer };
     split.push(ONE, BootIndex(1), Body::Observation(observation));
     (whole, split)
@@ -349,7 +370,9 @@ fn a_lost_boot_forgets_that_robot_and_keeps_the_marginal_of_the_others() {
             nonce: 2,
             configuration: 0,
             nominal: Pose2::identity(),
-            continuation: None, calibration: None };
+            continuation: None,
+            calibration: None,
+        };
         logs.boot(ONE, restart, 1);
         let after = fold(form, &logs);
         assert_eq!(after.covariance.robots(), [TWO]);

@@ -88,7 +88,7 @@ fn trial(
     let run = simulate(scenario, seed)?;
     let truth = Truth::Tracks(run.tracks.clone());
     let filter = FilterArgs::exact(ErrorArg::Invariant);
-    let team = setup::simulated(scenario, run, filter);
+    let team = setup::simulated(scenario, run, &filter);
     let agent = team.agents.values().next().context("the scenario has no robot")?.clone();
     let configs: Vec<FoldConfig> =
         variants.iter().map(|variant| configuration(&agent, variant)).collect::<anyhow::Result<_>>()?;

@@ -113,7 +113,7 @@ fn worlds(args: &FaultsArgs) -> anyhow::Result<(FaultPlan, Vec<World>, Vec<Strin
     let worlds = (first..first.saturating_add(args.seeds)).map(|seed| {
         let run = simulate(&scenario, seed)?;
         let truth = Truth::Tracks(run.tracks.clone());
-        World::new(setup::simulated(&scenario, run, filter), truth, seed)
+        World::new(setup::simulated(&scenario, run, &filter), truth, seed)
     });
     let worlds = worlds.collect::<anyhow::Result<_>>()?;
     Ok((own.unwrap_or(scenario.faults), worlds, Vec::new()))

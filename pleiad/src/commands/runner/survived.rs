@@ -179,7 +179,9 @@ mod tests {
             nonce: 1,
             configuration,
             nominal: Pose2::identity(),
-            continuation: None, calibration: None };
+            continuation: None,
+            calibration: None,
+        };
         let noise = Noise::from_sigmas(&[0.1, 0.1]);
         let mut entries = vec![
             entry(robot, 0, Body::Boot(boot)),
