@@ -12,6 +12,7 @@ use crate::symmetric::Symmetric3;
 
 /// So many ties of two components are kept; of more, the one that lies closest between its neighbours in time goes.
 const MOST_TIES: usize = 24;
+const LAST_TIES: usize = 12;
 
 /// Whether a measurement is across two components: the map is one, also where nobody is in it.
 pub(super) fn is_across(joint: &Joint, quantity: &Quantity, taken: &[Taken]) -> bool {
@@ -99,7 +100,9 @@ fn thin(joint: &mut Joint, stays: Component, moves: Component) {
         return;
     }
     let time = |place: usize| joint.ties()[ties[place]].time.0;
-    let closest = (1..ties.len() - 1).min_by_key(|place| time(place + 1).saturating_sub(time(place - 1)));
+    // The last ones stay: robots that drift are told by what they saw in one meeting.
+    let closest =
+        (1..ties.len() - LAST_TIES).min_by_key(|place| time(place + 1).saturating_sub(time(place - 1)));
     if let Some(place) = closest {
         joint.untie(ties[place]);
     }

@@ -125,7 +125,7 @@ impl Problem<'_> {
         let rival = exact.any(|(other, _)| {
             other.cost < best.cost + COST_APART && self.are_apart(&best.transform, &other.transform)
         });
-        let sure = !rival && (posed || self.is_sure(&best.transform, &placement.spread));
+        let sure = !rival && (posed || self.is_sure(&placement));
         sure.then_some((best, placement))
     }
 
@@ -149,26 +149,62 @@ impl Problem<'_> {
         })
     }
 
-    /// The linearization holds over what is uncertain.
-    fn is_sure(&self, transform: &Pose2, spread: &Matrix3) -> bool {
-        if spread[(2, 2)].sqrt() >= WORST_HEADING {
+    /// The linearization holds over what is uncertain: at the last tie, of how its two ends lie to one another. The transform
+    /// itself may be as uncertain as a robot has drifted since its frame began.
+    fn is_sure(&self, placement: &Placement) -> bool {
+        let tied = self.ties.iter().rev().filter_map(|(_, tie)| {
+            let poses = self.poses(tie, &placement.transform)?;
+            matches!(tie.measured, Measured::Relative(_)).then_some((tie, poses))
+        });
+        let Some((tie, [from, to])) = tied.into_iter().next() else { return false };
+        let moved = self.moved_end(tie);
+        let apart = self.uncertainty(&tie.ends[moved], &tie.ends[1 - moved], placement);
+        if apart[(2, 2)].max(0.0).sqrt() >= WORST_HEADING {
             return false;
         }
-        self.ties.iter().all(|(_, tie)| {
-            let (Some([from, to]), Measured::Relative(_)) = (self.poses(tie, transform), tie.measured) else {
-                return true;
-            };
-            if matches!(tie.ends[0], End::Map) {
-                return true;
+        if matches!(tie.ends[0], End::Map) {
+            return true;
+        }
+        let between = to.position() - from.position();
+        let point = if moved == 0 { from.position() } else { to.position() };
+        // A point moved by exp(xi) goes by [I, J p] xi.
+        let by = Matrix3::new(1.0, 0.0, -point.y, 0.0, 1.0, point.x, 0.0, 0.0, 0.0);
+        let placed = by * apart * by.transpose();
+        let square = between.x * between.x + between.y * between.y;
+        placed[(0, 0)] + placed[(1, 1)] < WORST_SHARE * WORST_SHARE * square
+    }
+
+    /// Covariance of `tau + Ad_T xi_moved - xi_stays` once they are joined.
+    fn uncertainty(&self, moved: &End, stays: &End, placement: &Placement) -> Matrix3 {
+        let Placement { transform, spread, columns, through, .. } = placement;
+        let adjoint = transform.adjoint();
+        let mut parts: Vec<(usize, Matrix3)> = Vec::with_capacity(2);
+        if let End::Anchor(index) = moved {
+            parts.push((*index, adjoint));
+        }
+        if let End::Anchor(index) = stays {
+            parts.push((*index, -Matrix3::identity()));
+        }
+        let mut before = Matrix3::zeros();
+        for (i, by) in &parts {
+            for (j, with) in &parts {
+                before += by * self.joint.covariance().block(*i, *j) * with.transpose();
             }
-            let apart = to.position() - from.position();
-            let point = if self.moved_end(tie) == 0 { from.position() } else { to.position() };
-            // A point moved by exp(tau) goes by [I, J p] tau.
-            let by = Matrix3::new(1.0, 0.0, -point.y, 0.0, 1.0, point.x, 0.0, 0.0, 0.0);
-            let placed = by * spread * by.transpose();
-            let square = apart.x * apart.x + apart.y * apart.y;
-            placed[(0, 0)] + placed[(1, 1)] < WORST_SHARE * WORST_SHARE * square
-        })
+        }
+        let mut gained = Matrix3::zeros();
+        let mut by_transform = Matrix3::zeros();
+        for (column, q) in columns.iter().zip(through) {
+            let mut v = Vector3::zeros();
+            for (index, by) in &parts {
+                v += by * Vector3::new(column[3 * index], column[3 * index + 1], column[3 * index + 2]);
+            }
+            gained += v * v.transpose();
+            by_transform += v * q.transpose();
+        }
+        let cross = spread * by_transform.transpose();
+        before + spread - gained + by_transform * spread * by_transform.transpose()
+            - cross
+            - cross.transpose()
     }
 
     fn moved_end(&self, tie: &Tie) -> usize {
