@@ -39,6 +39,10 @@ fn full() -> Table {
     let text = "
         model = 'corrected.toml'
         [filter.relinearize]
+        [filter.clutter]
+        share = 0.1
+        reach_m = 10.0
+        [calibration]
         [prior]
         x_m = 0.0
         y_m = 0.0
@@ -172,6 +176,9 @@ fn documented_defaults_are_the_defaults() {
         defaults.insert(key.to_owned(), Value::Float(5.0));
     }
     defaults.insert("filter.relinearize.passes".to_owned(), Value::Integer(4));
+    for key in flattened(&full()).keys().filter(|key| key.starts_with("calibration.")) {
+        defaults.insert(key.clone(), Value::Float(0.0));
+    }
     let mut full = flattened(&full());
     for (key, documented) in documented_keys() {
         full.remove(&key);
@@ -437,6 +444,34 @@ fn facts_are_linearized_together_over_times_that_make_sense() {
         (format!("[filter]\nrelinearize = {{ block_s = 4.0 }}\n{closing}"), "ledger.cell_s"),
     ] {
         let said = of(&text).unwrap_err().to_string();
+        assert!(said.contains(key), "{text}: {said}");
+    }
+}
+
+#[test]
+fn what_is_to_be_found_out_has_values_that_make_sense() {
+    let of = |text: &str| read(&format!("{LEAST}{text}"))?.node();
+    let plain = of("").unwrap();
+    assert_eq!((plain.calibration, plain.fold.clutter, plain.fold.join), (None, None, false));
+    // A table alone is the robot whose clock is the team's: it states its velocity, and is sure.
+    assert!(of("[calibration]\n").unwrap().calibration.is_some_and(|calibration| calibration.is_none()));
+    let asked = of("[calibration]\nsigma_clock_offset_s = 0.1\nsigma_clock_drift_ppm = 50.0\n").unwrap();
+    assert_eq!(asked.calibration.unwrap().clock, [0.1, 50.0e-6]);
+    for text in ["[filter]\njoin = true\n", "[filter]\nclutter = { share = 0.1, reach_m = 8.0 }\n"] {
+        assert_ne!(of(text).unwrap().fold.hash(), plain.fold.hash(), "{text}");
+    }
+    for (text, key) in [
+        ("[filter]\nclutter = { share = 0.0, reach_m = 8.0 }\n", "filter.clutter.share"),
+        ("[filter]\nclutter = { share = 1.0, reach_m = 8.0 }\n", "filter.clutter.share"),
+        ("[filter]\nclutter = { share = 0.1, reach_m = -8.0 }\n", "filter.clutter.reach_m"),
+        ("strategy = 'pairwise'\n[filter]\nclutter = { share = 0.1, reach_m = 8.0 }\n", "strategy"),
+        ("[calibration]\nsigma_mount_m = -0.1\n", "calibration.sigma_mount_m"),
+        ("[filter]\nerror = 'additive'\n[calibration]\n", "filter.error"),
+        ("strategy = 'pairwise'\n[calibration]\n", "strategy"),
+        ("[filter]\nerror = 'additive'\njoin = true\n", "filter.error"),
+        ("strategy = 'independent'\n[sensors]\nunknown_landmarks = 'map'\n", "strategy"),
+    ] {
+        let said = of(text).unwrap_err().to_string();
         assert!(said.contains(key), "{text}: {said}");
     }
 }
