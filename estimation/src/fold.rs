@@ -1,99 +1,18 @@
 //! The fold: one fact at a time, in the order of their keys, into the joint state.
 
 mod across;
+mod config;
 mod window;
 
+pub use config::{Clutter, DEFAULT_GATE, FOLD_VERSION, FoldConfig};
 pub use window::Relinearization;
 pub(crate) use window::fold_blocks;
 
-use crate::fact::{Absolute, Boot, EntryId, Fingerprint, Noise, NominalState, Quantity};
+use crate::fact::{Boot, EntryId, Noise, NominalState, Quantity};
 use crate::geometry::{Matrix3, Vector2, Vector3};
 use crate::joint::{ErrorForm, Joint, ParameterKind, Participant, Update, clock_influence};
 use crate::measurement::{self, Linearization, Unusable};
-use crate::sample::Relative;
 use crate::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timestamp};
-
-/// Raised whenever the same facts would give other bits.
-pub const FOLD_VERSION: u32 = 2;
-
-/// Gate on the normalized innovation squared by dimension: chi-square at 99.9 %.
-pub const DEFAULT_GATE: [f64; 3] = [10.828, 13.816, 16.266];
-
-/// All that decides the bits of an estimate besides the facts. A team must agree on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FoldConfig {
-    /// Coordinates of the error.
-    pub form: ErrorForm,
-    /// Gate by dimension of the measurement, 1 to 3; infinite to accept everything.
-    pub gate: [f64; 3],
-    /// Some observations are of nothing; `None` if all are of what they say.
-    pub clutter: Option<Clutter>,
-    /// A robot without a prior begins a frame of its own, until what is seen between frames tells how they lie to one another.
-    /// Without it such a robot has no place.
-    pub join: bool,
-    /// Facts are linearized together; `None` for each where those before it put the robots.
-    pub relinearize: Option<Relinearization>,
-}
-
-/// Observations of what is not there: any reading the sensor can give, as likely as any other.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Clutter {
-    /// Share of observations that are of nothing.
-    pub share: f64,
-    /// How far sensors see, m, and how far from the origin a position fix may be.
-    pub reach_m: f64,
-}
-
-impl Clutter {
-    /// Logarithm of the odds of an observation's being of nothing, by the density of its readings.
-    fn log_odds(&self, quantity: &Quantity) -> f64 {
-        let disc = std::f64::consts::PI * self.reach_m * self.reach_m;
-        let turn = std::f64::consts::TAU;
-        let volume = match quantity {
-            Quantity::Robot { relative, .. }
-            | Quantity::Landmark { relative, .. }
-            | Quantity::Feature { relative, .. } => match relative {
-                Relative::Pose(_) => disc * turn,
-                Relative::Position { .. } => disc,
-                Relative::Range { .. } => self.reach_m,
-                Relative::Bearing { .. } => turn,
-                Relative::RangeBearing { .. } => self.reach_m * turn,
-            },
-            Quantity::Absolute(Absolute::Pose(_)) => disc * turn,
-            Quantity::Absolute(Absolute::Position(_)) => disc,
-            Quantity::Absolute(Absolute::Heading(_)) => turn,
-        };
-        libm::log(self.share / (1.0 - self.share)) - libm::log(volume)
-    }
-}
-
-impl Default for FoldConfig {
-    fn default() -> Self {
-        Self { form: ErrorForm::Invariant, gate: DEFAULT_GATE, clutter: None, join: false, relinearize: None }
-    }
-}
-
-impl FoldConfig {
-    /// Hash of the configuration and the version of the fold. Robots whose hashes differ cannot share a
-    /// ledger.
-    pub fn hash(&self) -> u64 {
-        let form = match self.form {
-            ErrorForm::Invariant => 0,
-            ErrorForm::Additive => 1,
-        };
-        let words = [u64::from(FOLD_VERSION), form].into_iter().chain(self.gate.map(f64::to_bits));
-        let together = self.relinearize.iter().flat_map(|how| {
-            let lengths = [how.block_ns, how.ahead_ns, how.cell_ns].map(i64::cast_unsigned);
-            lengths.into_iter().chain([u64::from(how.passes)])
-        });
-        let clutter = self.clutter.iter().flat_map(|of| [of.share, of.reach_m].map(f64::to_bits));
-        // Told apart from what follows by their number.
-        let words = words.chain(clutter).chain(self.clutter.iter().map(|_| 1)).chain(together);
-        let words = words.chain(self.join.then_some(2));
-        let Fingerprint(bytes) = Fingerprint::of_words(words);
-        bytes[..8].iter().fold(0, |hash, byte| hash << 8 | u64::from(*byte))
-    }
-}
 
 /// Where a fact stands in the order of the fold: by time, boots before observations of equal time, then
 /// by robot, boot and sequence.

@@ -43,8 +43,7 @@ pub(super) fn fold_across(
     for (which, ((index, _), pose)) in taken.iter().zip(&poses).enumerate() {
         let end = joint.anchor(*index, *pose);
         if let End::Anchor(at) = end {
-            for (block, of, by) in influences.iter().filter(|(_, of, _)| *of == which) {
-                debug_assert_eq!(*of, which);
+            for (block, _, by) in influences.iter().filter(|(_, of, _)| *of == which) {
                 joint.couple(at, *block, by);
             }
         }

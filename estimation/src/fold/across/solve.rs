@@ -1,5 +1,10 @@
 //! How one component lies in another, by the ties between them: Gauss-Newton from many starts, and whether there is one answer.
 
+mod dense;
+mod starts;
+
+use dense::{Factor, dot, entries, inverse3, solve3, spread};
+
 use super::ties_of;
 use crate::Pose2;
 use crate::fact::Absolute;
@@ -9,9 +14,6 @@ use crate::joint::{Component, End, Joint, Measured, Placement, Tie};
 use crate::measurement::{self, Linearization};
 use crate::sample::Relative;
 
-const HEADINGS: u32 = 12;
-const DIRECTIONS: u32 = 12;
-const DISTANCES_M: [f64; 5] = [0.7, 1.5, 3.0, 6.0, 12.0];
 const ITERATIONS: u32 = 12;
 /// Longest step of the heading in one iteration, rad.
 const LONGEST_TURN: f64 = 0.5;
@@ -43,6 +45,20 @@ struct Row {
     blocks: Vec<(usize, Matrix3)>,
     /// Derivative by the error of the transform.
     through: Matrix3,
+}
+
+/// A Gauss-Newton step over all ties of a pair.
+struct Step {
+    rows: Vec<Row>,
+    /// Of `W`.
+    factor: Factor,
+    /// `L^-1 Ht`, a row for every number measured.
+    through: Vec<Vector3>,
+    /// `Ht^T W^-1 Ht`.
+    information: Matrix3,
+    /// `L^-1 (r - Ht tau)`.
+    left: Vec<f64>,
+    tau: Vector3,
 }
 
 /// The ties of a pair of components.
@@ -296,90 +312,81 @@ impl Problem<'_> {
     /// Gauss-Newton with all correlations, and what follows from the minimum.
     fn polish(&self, start: Pose2) -> Option<(Minimum, Placement)> {
         let mut transform = start;
-        let mut found = None;
+        let mut last = None;
         for _ in 0..ITERATIONS {
-            let rows = self.rows(&transform)?;
-            let offsets: Vec<usize> = rows
-                .iter()
-                .scan(0, |next, row| {
-                    let this = *next;
-                    *next += row.at.dimension;
-                    Some(this)
-                })
-                .collect();
-            let size: usize = rows.iter().map(|row| row.at.dimension).sum();
-            let mut w = vec![vec![0.0; size]; size];
-            for (i, one) in rows.iter().enumerate() {
-                for (j, other) in rows.iter().enumerate().take(i + 1) {
-                    let mut block = self.covariance(one, other);
-                    if i == j {
-                        block += self.ties[i].1.noise.to_matrix();
-                    }
-                    for a in 0..one.at.dimension {
-                        for b in 0..other.at.dimension {
-                            w[offsets[i] + a][offsets[j] + b] = block[(a, b)];
-                        }
-                    }
-                }
-            }
-            let factor = Factor::new(w)?;
-            let stacked = |of: &dyn Fn(&Row, usize) -> f64| -> Vec<f64> {
-                rows.iter()
-                    .flat_map(|row| (0..row.at.dimension).map(|k| of(row, k)).collect::<Vec<_>>())
-                    .collect()
-            };
-            let whitened = factor.forward(&stacked(&|row, k| row.at.innovation[k]));
-            let columns = [0, 1, 2].map(|axis| factor.forward(&stacked(&|row, k| row.through[(k, axis)])));
-            let mut information = Matrix3::zeros();
-            let mut along = Vector3::zeros();
-            for a in 0..3 {
-                for b in 0..3 {
-                    information[(a, b)] = dot(&columns[a], &columns[b]);
-                }
-                along[a] = dot(&columns[a], &whitened);
-            }
-            let step = solve3(&information, &along)?;
-            // What is left of the innovations when the transform has taken its part.
-            let left: Vec<f64> = whitened
-                .iter()
-                .enumerate()
-                .map(|(k, r)| r - columns[0][k] * step.x - columns[1][k] * step.y - columns[2][k] * step.z)
-                .collect();
-            let cost = dot(&left, &left);
-            transform = Pose2::exp(limited(step)).compose(&transform);
-            found = Some((rows, offsets, factor, columns, information, left, cost, step));
+            let step = self.step(&transform)?;
+            transform = Pose2::exp(limited(step.tau)).compose(&transform);
+            last = Some(step);
         }
-        let (rows, offsets, factor, columns, information, left, cost, step) = found?;
-        if step.x.abs() > 1e-3 || step.y.abs() > 1e-3 || step.z.abs() > 1e-4 {
-            return None;
-        }
-        let spread = inverse3(&information)?;
-        let through = (0..left.len()).map(|k| Vector3::new(columns[0][k], columns[1][k], columns[2][k]));
+        let step = last.filter(|step| {
+            step.tau.x.abs() <= 1e-3 && step.tau.y.abs() <= 1e-3 && step.tau.z.abs() <= 1e-4
+        })?;
+        let cost = dot(&step.left, &step.left);
         let placement = Placement {
             transform,
-            spread,
-            columns: factor.right(&self.gains(&rows, &offsets)),
-            through: through.collect(),
-            whitened: left,
+            spread: inverse3(&step.information)?,
+            columns: step.factor.right(&self.gains(&step.rows)),
+            through: step.through,
+            whitened: step.left,
             used: self.ties.iter().map(|(number, _)| *number).collect(),
         };
         Some((Minimum { transform, cost }, placement))
     }
 
+    /// One step, with all correlations between ties.
+    fn step(&self, transform: &Pose2) -> Option<Step> {
+        let rows = self.rows(transform)?;
+        let places: Vec<(usize, usize)> = rows
+            .iter()
+            .enumerate()
+            .flat_map(|(tie, row)| (0..row.at.dimension).map(move |component| (tie, component)))
+            .collect();
+        let mut w = vec![vec![0.0; places.len()]; places.len()];
+        for (i, one) in rows.iter().enumerate() {
+            for (j, other) in rows.iter().enumerate().take(i + 1) {
+                let mut block = self.covariance(one, other);
+                if i == j {
+                    block += self.ties[i].1.noise.to_matrix();
+                }
+                for (row, (_, a)) in places.iter().enumerate().filter(|(_, (tie, _))| *tie == i) {
+                    for (column, (_, b)) in places.iter().enumerate().filter(|(_, (tie, _))| *tie == j) {
+                        w[row][column] = block[(*a, *b)];
+                    }
+                }
+            }
+        }
+        let factor = Factor::new(w)?;
+        let stacked = |of: &dyn Fn(&Row, usize) -> f64| -> Vec<f64> {
+            places.iter().map(|(tie, component)| of(&rows[*tie], *component)).collect()
+        };
+        let whitened = factor.forward(&stacked(&|row, k| row.at.innovation[k]));
+        let columns = [0, 1, 2].map(|axis| factor.forward(&stacked(&|row, k| row.through[(k, axis)])));
+        let information = Matrix3::from_fn(|a, b| dot(&columns[a], &columns[b]));
+        let along = Vector3::from_fn(|a, _| dot(&columns[a], &whitened));
+        let tau = solve3(&information, &along)?;
+        let through: Vec<Vector3> =
+            (0..places.len()).map(|k| Vector3::new(columns[0][k], columns[1][k], columns[2][k])).collect();
+        // What is left of the innovations when the transform has taken its part.
+        let taken = |q: &Vector3| q.x * tau.x + q.y * tau.y + q.z * tau.z;
+        let left = whitened.iter().zip(&through).map(|(r, q)| r - taken(q)).collect();
+        Some(Step { rows, factor, through, information, left, tau })
+    }
+
     /// `P Hx^T`, by columns.
-    fn gains(&self, rows: &[Row], offsets: &[usize]) -> Vec<Vec<f64>> {
+    fn gains(&self, rows: &[Row]) -> Vec<Vec<f64>> {
         let covariance = self.joint.covariance();
-        let mut columns = vec![vec![0.0; covariance.size()]; rows.iter().map(|row| row.at.dimension).sum()];
-        for (row, offset) in rows.iter().zip(offsets) {
-            for (index, by) in &row.blocks {
-                for axis in 0..3 {
-                    let column = covariance.row(3 * index + axis);
-                    for k in 0..row.at.dimension {
-                        for (entry, value) in columns[offset + k].iter_mut().zip(&column) {
+        let mut columns = Vec::new();
+        for row in rows {
+            for k in 0..row.at.dimension {
+                let mut column = vec![0.0; covariance.size()];
+                for (index, by) in &row.blocks {
+                    for axis in 0..3 {
+                        for (entry, value) in column.iter_mut().zip(covariance.row(3 * index + axis)) {
                             *entry += by[(k, axis)] * value;
                         }
                     }
                 }
+                columns.push(column);
             }
         }
         columns
@@ -395,165 +402,11 @@ impl Problem<'_> {
         let misfits: Vec<f64> = rows.iter().zip(&self.ties).map(misfit).collect();
         (0..misfits.len()).max_by(|a, b| misfits[*a].total_cmp(&misfits[*b]))
     }
-
-    /// Where to begin: at what a full pose says, else with every heading, and the place that one tie gives then.
-    fn starts(&self) -> Vec<Pose2> {
-        let mut starts = Vec::new();
-        for (_, tie) in &self.ties {
-            if let (Measured::Relative(Relative::Pose(seen)), Some([from, to])) =
-                (&tie.measured, self.poses(tie, &Pose2::identity()))
-            {
-                starts.push(if self.moved_end(tie) == 1 {
-                    from.compose(seen).compose(&to.inverse())
-                } else {
-                    to.compose(&seen.inverse()).compose(&from.inverse())
-                });
-            }
-        }
-        if !starts.is_empty() {
-            return starts;
-        }
-        let Some((tie, points)) = self.seed() else { return starts };
-        let Some([from, to]) = self.poses(tie, &Pose2::identity()) else { return starts };
-        for heading in 0..HEADINGS {
-            let yaw = std::f64::consts::TAU * f64::from(heading) / f64::from(HEADINGS);
-            let turn = Pose2::new(0.0, 0.0, yaw);
-            for point in &points {
-                let seen = from.act(*point);
-                let place = if self.moved_end(tie) == 1 {
-                    seen - turn.rotate(to.position())
-                } else {
-                    to.position() - turn.rotate(seen)
-                };
-                starts.push(Pose2::new(place.x, place.y, yaw));
-            }
-        }
-        starts
-    }
-
-    /// The tie that says most about a place, and where it may have seen what it saw, in the frame it sees from.
-    fn seed(&self) -> Option<(&Tie, Vec<Vector2>)> {
-        let polar =
-            |range: f64, bearing: f64| Vector2::new(range * libm::cos(bearing), range * libm::sin(bearing));
-        let points = |tie: &Tie| match &tie.measured {
-            Measured::Relative(Relative::Position { x_m, y_m }) => vec![Vector2::new(*x_m, *y_m)],
-            Measured::Relative(Relative::RangeBearing { range_m, bearing_rad }) => {
-                vec![polar(*range_m, *bearing_rad)]
-            }
-            Measured::Relative(Relative::Range { range_m }) => {
-                let turn = std::f64::consts::TAU / f64::from(DIRECTIONS);
-                (0..DIRECTIONS).map(|direction| polar(*range_m, turn * f64::from(direction))).collect()
-            }
-            Measured::Relative(Relative::Bearing { bearing_rad }) => {
-                DISTANCES_M.iter().map(|range| polar(*range, *bearing_rad)).collect()
-            }
-            Measured::Relative(Relative::Pose(_)) | Measured::Heading(_) => Vec::new(),
-        };
-        let seeds = self.ties.iter().map(|(_, tie)| (*tie, points(tie)));
-        seeds.filter(|(_, points)| !points.is_empty()).min_by_key(|(_, points)| points.len())
-    }
-}
-
-/// A lower Cholesky factor.
-struct Factor(Vec<Vec<f64>>);
-
-impl Factor {
-    /// Of a symmetric matrix given by its lower triangle; `None` if it is not positive definite.
-    fn new(mut w: Vec<Vec<f64>>) -> Option<Self> {
-        for row in 0..w.len() {
-            for column in 0..=row {
-                let mut sum = w[row][column];
-                for k in 0..column {
-                    sum -= w[row][k] * w[column][k];
-                }
-                if row == column {
-                    if !(sum > 0.0 && sum.is_finite()) {
-                        return None;
-                    }
-                    w[row][row] = sum.sqrt();
-                } else {
-                    w[row][column] = sum / w[column][column];
-                }
-            }
-        }
-        Some(Self(w))
-    }
-
-    /// `L^-1 b`.
-    fn forward(&self, b: &[f64]) -> Vec<f64> {
-        let mut solved: Vec<f64> = Vec::with_capacity(b.len());
-        for (row, value) in b.iter().enumerate() {
-            let mut sum = *value;
-            for (k, earlier) in solved.iter().enumerate() {
-                sum -= self.0[row][k] * earlier;
-            }
-            solved.push(sum / self.0[row][row]);
-        }
-        solved
-    }
-
-    /// `A L^-T`, both by columns.
-    fn right(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let mut solved: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
-        for (row, column) in columns.iter().enumerate() {
-            let mut next = column.clone();
-            for (k, earlier) in solved.iter().enumerate() {
-                let factor = self.0[row][k];
-                for (entry, value) in next.iter_mut().zip(earlier) {
-                    *entry -= factor * value;
-                }
-            }
-            for entry in &mut next {
-                *entry /= self.0[row][row];
-            }
-            solved.push(next);
-        }
-        solved
-    }
-}
-
-fn spread(dimension: usize, m: &Matrix3) -> Vec<Vec<f64>> {
-    (0..dimension).map(|row| (0..dimension).map(|column| m[(row, column)]).collect()).collect()
-}
-
-fn entries(dimension: usize, v: &Vector3) -> Vec<f64> {
-    (0..dimension).map(|k| v[k]).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sum = 0.0;
-    for (x, y) in a.iter().zip(b) {
-        sum += x * y;
-    }
-    sum
 }
 
 fn limited(step: Vector3) -> Vector3 {
     let turn = step.z.abs();
     if turn > LONGEST_TURN { step * (LONGEST_TURN / turn) } else { step }
-}
-
-/// Whether an information matrix has all three directions, beyond rounding.
-fn factor3(information: &Matrix3) -> Option<Factor> {
-    let scale = information[(0, 0)].max(information[(1, 1)]).max(information[(2, 2)]);
-    let factor = Factor::new(spread(3, information))?;
-    let weakest = factor.0.iter().enumerate().map(|(k, row)| row[k]).fold(f64::INFINITY, f64::min);
-    (weakest * weakest > 1e-9 * scale).then_some(factor)
-}
-
-fn solve3(information: &Matrix3, along: &Vector3) -> Option<Vector3> {
-    let inverse = inverse3(information)?;
-    Some(inverse * along)
-}
-
-fn inverse3(information: &Matrix3) -> Option<Matrix3> {
-    let factor = factor3(information)?;
-    let columns = [0, 1, 2].map(|axis| {
-        let mut unit = vec![0.0; 3];
-        unit[axis] = 1.0;
-        factor.forward(&unit)
-    });
-    Some(Matrix3::from_fn(|a, b| dot(&columns[a], &columns[b])))
 }
 
 /// The 99.9 % quantile of chi-square (`wilson1931`).
