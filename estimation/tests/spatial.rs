@@ -1,0 +1,397 @@
+//! The filter in space: the order of arrival, an oracle that steps every tick, the null space, and consistency.
+
+#![allow(clippy::unwrap_used, reason = "a failed expectation is a failed test")]
+
+#[path = "support/space.rs"]
+mod space;
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+use pleiad_estimation::fold::FactKey;
+use pleiad_estimation::geometry::{LieGroup, Pose3, Square, Tangent6, Vector3};
+use pleiad_estimation::group_fold::{
+    Continuation, Fact, FactSet, FoldConfig, Insertion, Joint, Noise, NominalState, Outcome, Quantity,
+    Symmetric,
+};
+use pleiad_estimation::reference::spatial::{Matrix, Seen, SpatialEkf, Target};
+use pleiad_estimation::spatial::{Absolute3, Relative3};
+use pleiad_estimation::statistics::NeesSummary;
+use pleiad_estimation::{BootIndex, RobotId, Timestamp};
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use space::{Event, Fact3, Options, Run, errors, run};
+
+const ACCEPT: FoldConfig<6> = FoldConfig { gate: [f64::INFINITY; 6] };
+
+/// The joint of a run with every robot carried on to its end.
+fn at_the_end(run: &Run, config: &FoldConfig<6>) -> Joint<Pose3, 6> {
+    let (mut joint, _) = run.set().fold(config);
+    for (state, robot) in run.ends.iter().zip(1..) {
+        joint.carry_to(RobotId(robot), state);
+    }
+    joint
+}
+
+fn estimates(run: &Run, joint: &Joint<Pose3, 6>) -> Vec<Pose3> {
+    let ends = run.ends.iter().zip(1..);
+    ends.map(|(state, robot)| joint.estimate(RobotId(robot), state).unwrap().0).collect()
+}
+
+// The order of arrival.
+
+fn check_order(seed: u64, robots: u32) {
+    let run = run(seed, &Options { robots, ..Options::default() });
+    let (straight, records) = run.set().fold(&FoldConfig::default());
+    let used = records.iter().filter(|(_, record)| record.outcome == Outcome::Used).count();
+    assert!(used > 50, "{used}");
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0xA5A5);
+    let mut shuffled = run.facts.clone();
+    shuffled.extend(run.facts.iter().filter(|_| random.random::<f64>() < 0.3));
+    for index in (1..shuffled.len()).rev() {
+        shuffled.swap(index, random.random_range(0..=index));
+    }
+    let mut set = FactSet::new();
+    for (key, fact) in shuffled {
+        assert_ne!(set.insert(key, fact), Ok(Insertion::Contradicted));
+    }
+    let (joint, again) = set.fold(&FoldConfig::default());
+    assert_eq!(joint.fingerprint(), straight.fingerprint(), "seed {seed}");
+    assert_eq!((joint, again), (straight, records));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 16, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_order_and_repetition_gives_the_same_bits(seed in 0u64..1_000_000, robots in 2u32..=6) {
+        check_order(seed, robots);
+    }
+}
+
+#[test]
+fn two_facts_of_one_key_cancel_whichever_comes_first() {
+    let run = run(3, &Options::default());
+    let (key, fact) = run.facts[20];
+    let Fact::Observation { quantity, noise, mut observer, other } = fact else { panic!("an observation") };
+    observer.nominal = observer.nominal.compose(&Pose3::exp(&Tangent6::repeat(1e-9)));
+    let contradicting: Fact3 = Fact::Observation { quantity, noise, observer, other };
+    let mut without = FactSet::new();
+    for (other, fact) in run.facts.iter().filter(|(other, _)| *other != key) {
+        without.insert(*other, *fact).unwrap();
+    }
+    let mut before = without.clone();
+    let mut after = without.clone();
+    let inserted = [fact, contradicting, fact].map(|fact| before.insert(key, fact).unwrap());
+    assert_eq!(inserted, [Insertion::Added, Insertion::Contradicted, Insertion::Contradicted]);
+    for fact in [contradicting, contradicting, fact] {
+        after.insert(key, fact).unwrap();
+    }
+    assert_eq!(before, after);
+    assert_eq!(before.contradicted().collect::<Vec<_>>(), [&key]);
+    assert_eq!(before.fold(&ACCEPT).0.fingerprint(), without.fold(&ACCEPT).0.fingerprint());
+}
+
+#[test]
+fn what_is_not_a_fact_is_refused_by_name() {
+    let run = run(3, &Options::default());
+    let (key, fact) = run.facts[20];
+    let Fact::Observation { quantity, noise, observer, other } = fact else { panic!("an observation") };
+    let refused = |fact: Fact3| FactSet::new().insert(key, fact).unwrap_err().to_string();
+    let nowhere = Quantity::Absolute(Absolute3::Position(Vector3::new(f64::NAN, 0.0, 0.0)));
+    let three = Noise::from_sigmas(&[1.0; 3]);
+    let message = refused(Fact::Observation { quantity: nowhere, noise: three, observer, other });
+    assert!(message.contains("the measurement"), "{message}");
+    let negative = Noise { covariance: noise.covariance.scaled(-1.0), ..noise };
+    let message = refused(Fact::Observation { quantity, noise: negative, observer, other });
+    assert!(message.contains("the noise of the measurement"), "{message}");
+    let other_size = Noise { dimension: noise.dimension + 1, ..noise };
+    assert!(
+        refused(Fact::Observation { quantity, noise: other_size, observer, other }).contains("dimension")
+    );
+    let infinite = NominalState { noise_sum: Symmetric::from_sigmas([f64::INFINITY; 6]), ..observer };
+    let message = refused(Fact::Observation { quantity, noise, observer: infinite, other });
+    assert!(message.contains("the observer's state"), "{message}");
+}
+
+// The oracle.
+
+fn matrix(pose: &Pose3) -> Matrix {
+    let mut matrix = Matrix::identity();
+    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&pose.rotation());
+    matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&pose.position());
+    matrix
+}
+
+fn dense(noise: &Symmetric<6>, dimension: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(dimension, dimension, |row, column| noise.entry(row, column))
+}
+
+fn seen(relative: &Relative3) -> Seen {
+    match relative {
+        Relative3::Pose(pose) => Seen::Pose(matrix(pose)),
+        Relative3::Position(z) => Seen::Position(*z),
+        Relative3::Range(range) => Seen::Range(*range),
+        Relative3::Bearing(z) => Seen::Bearing(z.vector()),
+        Relative3::RangeBearing(range, z) => Seen::RangeBearing(*range, z.vector()),
+    }
+}
+
+fn oracle(run: &Run) -> SpatialEkf {
+    let mut priors = BTreeMap::new();
+    let mut filter = None;
+    for event in &run.events {
+        match event {
+            Event::Observation(robot, Quantity::Absolute(Absolute3::Pose(z)), noise) => {
+                priors.insert(*robot, (matrix(z), dense(&noise.covariance, 6)));
+            }
+            Event::Observation(robot, quantity, noise) => {
+                let (target, seen) = match quantity {
+                    Quantity::Robot { robot, relative } => (Target::Robot(*robot), seen(relative)),
+                    Quantity::Landmark { position_m, relative, .. } => {
+                        (Target::Point(*position_m), seen(relative))
+                    }
+                    Quantity::Absolute(Absolute3::Position(z)) => (Target::Map, Seen::Position(*z)),
+                    Quantity::Absolute(Absolute3::Pose(z)) => (Target::Map, Seen::Pose(matrix(z))),
+                };
+                let filter = filter.get_or_insert_with(|| SpatialEkf::new(&priors));
+                let noise = dense(&noise.covariance, noise.dimension);
+                assert!(filter.observe(*robot, &target, &seen, &noise).is_some());
+            }
+            Event::Step(robot, step) => {
+                let filter = filter.get_or_insert_with(|| SpatialEkf::new(&priors));
+                filter.step(*robot, &step.motion, &dense(&step.covariance, 6));
+            }
+        }
+    }
+    filter.unwrap()
+}
+
+/// Largest difference of an estimate from the oracle's, over its sigma, and of the covariance, over its largest entry.
+fn off_oracle(seed: u64, noise: f64) -> (f64, f64) {
+    let options = Options { noise, between: false, seconds: 10, ..Options::default() };
+    let run = run(seed, &options);
+    let joint = at_the_end(&run, &ACCEPT);
+    let filter = oracle(&run);
+    let covariance = joint.covariance().to_dense();
+    let mut most = 0.0f64;
+    for (index, estimate) in estimates(&run, &joint).iter().enumerate() {
+        let theirs = filter.pose(RobotId(index as u32 + 1)).unwrap();
+        let off = pleiad_estimation::reference::spatial::log(&(theirs * matrix(&estimate.inverse())));
+        for axis in 0..6 {
+            let sigma = covariance[(6 * index + axis, 6 * index + axis)].sqrt();
+            most = most.max(off[axis].abs() / sigma);
+        }
+    }
+    (most, (&covariance - filter.covariance()).amax() / covariance.amax())
+}
+
+#[test]
+fn the_fold_is_the_filter_of_every_tick_to_second_order_in_corrections() {
+    for seed in 0..4 {
+        let (whole, p_whole) = off_oracle(seed, 1.0);
+        let (tenth, p_tenth) = off_oracle(seed, 0.1);
+        let (least, p_least) = off_oracle(seed, 0.01);
+        println!(
+            "seed {seed}: {whole:.2e} {tenth:.2e} {least:.2e} of sigma; P {p_whole:.2e} {p_tenth:.2e} {p_least:.2e}"
+        );
+        // Over a sigma that falls with the noise, what is of second order falls tenfold with a tenth of it.
+        assert!(whole < 0.1 && p_whole < 0.05, "seed {seed}: {whole} {p_whole}");
+        assert!((5.0..20.0).contains(&(whole / tenth)) || tenth < 1e-3, "seed {seed}: {whole} {tenth}");
+        assert!(tenth < 0.01 && least < 0.001, "seed {seed}: {tenth} {least}");
+        assert!(p_tenth < 0.005 && p_least < 0.0005, "seed {seed}: {p_tenth} {p_least}");
+    }
+}
+
+// The null space.
+
+/// `E^T P^-1 E` with `E = [I; I; ..]`: what is known of an error common to all.
+fn common_information(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let common =
+        DMatrix::from_fn(covariance.nrows(), 6, |row, column| f64::from(u8::from(row % 6 == column)));
+    common.transpose() * covariance.clone().cholesky().unwrap().solve(&common)
+}
+
+#[test]
+fn relative_measurements_say_nothing_of_an_error_common_to_all() {
+    let run = run(8, &Options { absolute: false, walk: 0.0, ..Options::default() });
+    let joint = at_the_end(&run, &ACCEPT);
+    let known = common_information(&joint.covariance().to_dense());
+    // All that is known of it comes from the priors, each in the frame of its robot.
+    let (mut priors, mut spread) = (DMatrix::zeros(6, 6), 0.0);
+    for (_, fact) in &run.facts {
+        if let Fact::Observation { quantity: Quantity::Absolute(Absolute3::Pose(z)), noise, .. } = fact {
+            let block = dense(&noise.covariance.congruence(&LieGroup::adjoint(z)), 6);
+            spread += block.trace();
+            priors += block.cholesky().unwrap().inverse();
+        }
+    }
+    assert!(
+        (&known - &priors).amax() < 1e-7 * priors.amax(),
+        "{}",
+        (&known - &priors).amax() / priors.amax()
+    );
+    // Of the rest they do say something.
+    assert!(joint.covariance().to_dense().trace() < 0.5 * spread, "{spread}");
+}
+
+// Consistency.
+
+fn consistency(options: &Options, seeds: std::ops::Range<u64>) -> NeesSummary {
+    let runs: Vec<_> = seeds
+        .map(|seed| {
+            let run = run(seed, options);
+            let joint = at_the_end(&run, &ACCEPT);
+            let errors = errors(&run.truth, &estimates(&run, &joint));
+            vec![(DVector::from_vec(errors), joint.covariance().to_dense())]
+        })
+        .collect();
+    NeesSummary::from_runs(&runs, 0.01).unwrap()
+}
+
+#[test]
+fn a_team_with_one_absolute_position_is_consistent() {
+    let summary = consistency(&Options::default(), 0..100);
+    println!("{summary:?}");
+    assert!(summary.is_consistent(), "{summary:?}");
+}
+
+#[test]
+fn a_team_without_an_absolute_fix_is_consistent_while_its_drift_is_small() {
+    let options = Options { absolute: false, seconds: 10, ..Options::default() };
+    let summary = consistency(&options, 1000..1100);
+    println!("{summary:?}");
+    assert!(summary.is_consistent(), "{summary:?}");
+}
+
+#[test]
+fn consistency_is_lost_if_the_process_noise_is_understated() {
+    // The clean case is above; the planted fault: facts that claim a quarter of the process noise.
+    let runs: Vec<_> = (0..30)
+        .map(|seed| {
+            let mut run = run(seed, &Options::default());
+            for (_, fact) in &mut run.facts {
+                if let Fact::Observation { observer, other, .. } = fact {
+                    observer.noise_sum = observer.noise_sum.scaled(0.25);
+                    if let Some((_, state)) = other {
+                        state.noise_sum = state.noise_sum.scaled(0.25);
+                    }
+                }
+            }
+            for state in &mut run.ends {
+                state.noise_sum = state.noise_sum.scaled(0.25);
+            }
+            let joint = at_the_end(&run, &ACCEPT);
+            let errors = errors(&run.truth, &estimates(&run, &joint));
+            vec![(DVector::from_vec(errors), joint.covariance().to_dense())]
+        })
+        .collect();
+    let summary = NeesSummary::from_runs(&runs, 0.01).unwrap();
+    assert!(!summary.is_consistent() && summary.overall.unwrap() > 1.2, "{summary:?}");
+}
+
+/// Mean over runs of the squared error of the middle of the team, and what the filter says of it, m^2.
+fn drift(absolute: bool, seconds: i64) -> (f64, f64) {
+    let runs = 300;
+    let (mut found, mut stated) = (0.0, 0.0);
+    for seed in 0..runs {
+        let run = run(seed, &Options { absolute, seconds, ..Options::default() });
+        let joint = at_the_end(&run, &ACCEPT);
+        let estimates = estimates(&run, &joint);
+        let share = 1.0 / estimates.len() as f64;
+        let mut middle = Vector3::zeros();
+        let mut rows = DMatrix::zeros(3, 6 * estimates.len());
+        for (index, (truth, estimate)) in run.truth.iter().zip(&estimates).enumerate() {
+            middle += (truth.position() - estimate.position()) * share;
+            let additive: Square<6> = estimate.additive_from_invariant();
+            for row in 0..3 {
+                for column in 0..6 {
+                    rows[(row, 6 * index + column)] = share * additive[(row, column)];
+                }
+            }
+        }
+        found += middle.norm_squared() / runs as f64;
+        stated += (&rows * joint.covariance().to_dense() * rows.transpose()).trace() / runs as f64;
+    }
+    (found, stated)
+}
+
+#[test]
+fn without_an_absolute_fix_the_common_drift_grows_and_with_one_it_does_not() {
+    let (early, early_stated) = drift(false, 5);
+    let (late, late_stated) = drift(false, 60);
+    let (fixed, fixed_stated) = drift(true, 60);
+    println!(
+        "found {early:.4} {late:.4} {fixed:.4}, stated {early_stated:.4} {late_stated:.4} {fixed_stated:.4}"
+    );
+    assert!(
+        late > 2.0 * early && late_stated > 2.0 * early_stated,
+        "{early} {late} {early_stated} {late_stated}"
+    );
+    assert!(
+        fixed < 0.5 * late && fixed_stated < 0.5 * late_stated,
+        "{fixed} {late} {fixed_stated} {late_stated}"
+    );
+    // Mean of 30 squares of some three equal parts: a standard deviation of 15 %.
+    for (found, stated) in [(early, early_stated), (late, late_stated), (fixed, fixed_stated)] {
+        assert!((0.5..1.6).contains(&(found / stated)), "{found} {stated}");
+    }
+}
+
+// Boots.
+
+#[test]
+fn a_restart_without_a_gap_changes_nothing_and_a_lost_one_ends_the_robot() {
+    let run = run(5, &Options::default());
+    let own = |key: &FactKey| key.id.robot == RobotId(1);
+    let facts_of_1 = run.facts.iter().filter(|(key, _)| own(key)).collect::<Vec<_>>();
+    let (at, middle) = facts_of_1[facts_of_1.len() / 2];
+    let Fact::Observation { observer: last, .. } = middle else { panic!("an observation") };
+    let begin = Pose3::exp(&Tangent6::new(-2.0, 7.0, 1.0, 0.4, -0.2, 1.3));
+    let s = begin.compose(&last.nominal.inverse());
+    let moved = |state: &NominalState<Pose3, 6>| NominalState {
+        nominal: s.compose(&state.nominal),
+        noise_sum: state.noise_sum.minus(&last.noise_sum).congruence(&LieGroup::adjoint(&s)),
+    };
+    let split = |continuation| {
+        let mut set = FactSet::new();
+        let mut id = at.id;
+        id.boot = BootIndex(1);
+        let boot = Fact::Boot { nominal: begin, continuation };
+        set.insert(FactKey::boot(Timestamp(at.time.0 + 1), id), boot).unwrap();
+        for (key, fact) in &run.facts {
+            let Fact::Observation { quantity, noise, mut observer, mut other } = *fact else { continue };
+            let mut key = *key;
+            if key.time > at.time {
+                if own(&key) {
+                    key.id.boot = BootIndex(1);
+                    observer = moved(&observer);
+                }
+                if matches!(quantity, Quantity::Robot { robot: RobotId(1), .. }) {
+                    other = other.map(|(_, state)| (BootIndex(1), moved(&state)));
+                }
+            }
+            set.insert(key, Fact::Observation { quantity, noise, observer, other }).unwrap();
+        }
+        set.fold(&ACCEPT)
+    };
+    let (whole, records) = run.set().fold(&ACCEPT);
+    let carried = Continuation { previous: BootIndex(0), last: *last, gap: Symmetric::zero() };
+    let (joint, again) = split(Some(carried));
+    assert_eq!(again.len(), records.len() + 1);
+    let largest = whole.covariance().to_dense().amax();
+    assert!((joint.covariance().to_dense() - whole.covariance().to_dense()).amax() < 1e-10 * largest);
+    for ((_, a), (_, b)) in joint.members().zip(whole.members()) {
+        // Compared as poses: the corrections of the restarted robot apply to another nominal trajectory.
+        let (a, b) = (a.correction.compose(&a.nominal), b.correction.compose(&b.nominal));
+        assert!(a.between(&b).log().norm() < 1e-10);
+    }
+    let gap = Symmetric::from_sigmas([1.0, 1.0, 1.0, 0.2, 0.2, 0.2]);
+    let (wider, _) = split(Some(Continuation { gap, ..carried }));
+    let sum = |joint: &Joint<Pose3, 6>| joint.covariance().to_dense().trace();
+    assert!(sum(&wider) > sum(&joint));
+    let (lost, records) = split(None);
+    assert_eq!(lost.index(RobotId(1)), None);
+    assert!(records.iter().any(|(_, record)| matches!(record.outcome, Outcome::Skipped(_))));
+}
