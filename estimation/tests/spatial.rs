@@ -213,12 +213,12 @@ fn common_information(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     common.transpose() * covariance.clone().cholesky().unwrap().solve(&common)
 }
 
-#[test]
-fn relative_measurements_say_nothing_of_an_error_common_to_all() {
-    let run = run(8, &Options { absolute: false, walk: 0.0, ..Options::default() });
+/// What is known of an error common to all, and what the priors alone say of it, each in the frame of its robot; and the
+/// traces of the covariance and of the priors.
+fn known_in_common(absolute: bool) -> (DMatrix<f64>, DMatrix<f64>, [f64; 2]) {
+    let run = run(8, &Options { absolute, walk: 0.0, ..Options::default() });
     let joint = at_the_end(&run, &ACCEPT);
-    let known = common_information(&joint.covariance().to_dense());
-    // All that is known of it comes from the priors, each in the frame of its robot.
+    let covariance = joint.covariance().to_dense();
     let (mut priors, mut spread) = (DMatrix::zeros(6, 6), 0.0);
     for (_, fact) in &run.facts {
         if let Fact::Observation { quantity: Quantity::Absolute(Absolute3::Pose(z)), noise, .. } = fact {
@@ -227,13 +227,25 @@ fn relative_measurements_say_nothing_of_an_error_common_to_all() {
             priors += block.cholesky().unwrap().inverse();
         }
     }
-    assert!(
-        (&known - &priors).amax() < 1e-7 * priors.amax(),
-        "{}",
-        (&known - &priors).amax() / priors.amax()
-    );
+    (common_information(&covariance), priors, [covariance.trace(), spread])
+}
+
+#[test]
+fn relative_measurements_say_nothing_of_an_error_common_to_all() {
+    let (known, priors, [after, before]) = known_in_common(false);
+    let off = (&known - &priors).amax() / priors.amax();
+    // Rounding through two inversions of matrices with a condition of some 1e5.
+    assert!(off < 1e-7, "{off}");
     // Of the rest they do say something.
-    assert!(joint.covariance().to_dense().trace() < 0.5 * spread, "{spread}");
+    assert!(after < 0.5 * before, "{after} {before}");
+}
+
+#[test]
+fn absolute_positions_of_one_robot_say_something_of_all_six_directions() {
+    let (known, priors, _) = known_in_common(true);
+    let gained = nalgebra::SymmetricEigen::new(known - priors).eigenvalues;
+    // In every direction more than a position or an angle known to one unit would.
+    assert!(gained.min() > 1.0, "{gained}");
 }
 
 // Consistency.
@@ -293,7 +305,7 @@ fn consistency_is_lost_if_the_process_noise_is_understated() {
 
 /// Mean over runs of the squared error of the middle of the team, and what the filter says of it, m^2.
 fn drift(absolute: bool, seconds: i64) -> (f64, f64) {
-    let runs = 300;
+    let runs = 100;
     let (mut found, mut stated) = (0.0, 0.0);
     for seed in 0..runs {
         let run = run(seed, &Options { absolute, seconds, ..Options::default() });
@@ -333,9 +345,9 @@ fn without_an_absolute_fix_the_common_drift_grows_and_with_one_it_does_not() {
         fixed < 0.5 * late && fixed_stated < 0.5 * late_stated,
         "{fixed} {late} {fixed_stated} {late_stated}"
     );
-    // Mean of 30 squares of some three equal parts: a standard deviation of 15 %.
+    // Mean of 100 squares of one to three parts: a standard deviation of 8 to 14 %.
     for (found, stated) in [(early, early_stated), (late, late_stated), (fixed, fixed_stated)] {
-        assert!((0.5..1.6).contains(&(found / stated)), "{found} {stated}");
+        assert!((0.65..1.4).contains(&(found / stated)), "{found} {stated}");
     }
 }
 

@@ -170,7 +170,7 @@ impl Pose3 {
         rotated(self.w, &scaled(&self.v, -1.0), v)
     }
 
-    /// The exponential map (eqs. 133, 172, 174).
+    /// The exponential map (eqs. 172, 174).
     pub fn exp(tangent: &Tangent6) -> Self {
         let (rho, phi) = parts(tangent);
         let angle = norm(&phi);
@@ -183,7 +183,7 @@ impl Pose3 {
         Self::normalized(position, w, v)
     }
 
-    /// The logarithm (eqs. 134, 173), with an angle in `[0, pi]`.
+    /// The logarithm (eq. 173), with an angle in `[0, pi]`.
     pub fn log(&self) -> Tangent6 {
         let phi = self.rotation_vector();
         // V^-1 p = p - phi x p / 2 + (1 - (angle/2) cot(angle/2))/angle^2 phi x (phi x p)

@@ -241,17 +241,14 @@ impl<G: Space<D>, const D: usize> Joint<G, D> {
             folded_noise: at.noise_sum,
             placed: true,
         };
-        let index = match self.members.iter().position(|known| known.robot == key.id.robot) {
-            Some(index) => {
-                self.members[index] = member;
-                index
-            }
-            None => {
-                self.members.push(member);
-                self.covariance.grow();
-                self.members.len() - 1
-            }
-        };
+        let known = self.members.iter().position(|known| known.robot == key.id.robot);
+        let index = known.unwrap_or(self.members.len());
+        if known.is_some() {
+            self.members[index] = member;
+        } else {
+            self.members.push(member);
+            self.covariance.grow();
+        }
         self.covariance.clear(index);
         self.covariance.add_diagonal(index, &noise.congruence(&z.adjoint()));
     }

@@ -5,8 +5,9 @@
 //! samples. Biases are taken off before; a bias that is left is not in the noise model, nor a rate of the Earth.
 //!
 //! **Accelerations are not taken.** Their integral is a velocity, whose error is the same at all later times: it belongs in
-//! the state (the group of extended poses of `barrau2017`), and increments with independent noise would claim that it does
-//! not. Integrate them elsewhere, with gravity, and give the velocity found there with a noise that covers its error.
+//! the state (the group of double direct isometries of `barrau2017`), and increments with independent noise would claim
+//! that it does not. Who has accelerations alone integrates them elsewhere, with gravity, and gives the velocity found there
+//! with a noise that covers its error.
 
 use crate::Timestamp;
 use crate::geometry::{Tangent6, Vector3};
@@ -117,8 +118,8 @@ impl DeadReckoning {
 }
 
 /// `u` with `exp(u)` the motion of a body whose twist goes linearly from `a` to `b` in `h` seconds: the first two terms of
-/// the Magnus expansion, `h (a + b)/2 + h^2 [a, b]/12`, with an error of the order of `h^5` (`blanes2009`, section 2, with the sign of
-/// the bracket for `X' = X a`). The second term is what strapdown navigation calls coning and sculling.
+/// the Magnus expansion, `h (a + b)/2 + h^2 [a, b]/12`, with an error of the order of `h^5` (`blanes2009`; the sign of the
+/// bracket is that for `X' = X a`). The second term is what strapdown navigation calls coning and sculling.
 fn increment(a: &Tangent6, b: &Tangent6, h: f64) -> Tangent6 {
     let bracket = bracket(a, b);
     Tangent6::from(std::array::from_fn::<f64, 6, _>(|k| 0.5 * h * (a[k] + b[k]) + h * h / 12.0 * bracket[k]))

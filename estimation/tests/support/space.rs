@@ -1,5 +1,5 @@
 //! A team in space: what it does, as facts and as the ticks of a filter that knows no facts. True motion, noise and all
-//! choices come from one seed.
+//! choices come from one seed; transcendental functions from `libm`, so that the facts are the same bits everywhere.
 
 #![allow(dead_code, reason = "each test target uses its part")]
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small numbers of a fixture")]
@@ -15,7 +15,6 @@ use pleiad_estimation::spatial::{
 use pleiad_estimation::{BootIndex, LandmarkId, RobotId, Sequence, Timestamp};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 pub type Fact3 = Fact<Pose3, 6>;
 pub type State3 = NominalState<Pose3, 6>;
@@ -71,7 +70,9 @@ struct Robot {
 }
 
 pub fn gaussian(random: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(random)
+    // Box and Muller through libm: portable bits.
+    let (u, v): (f64, f64) = (1.0 - random.random::<f64>(), random.random());
+    libm::sqrt(-2.0 * libm::log(u)) * libm::cos(std::f64::consts::TAU * v)
 }
 
 fn noise6(sigmas: [f64; 6], random: &mut ChaCha8Rng) -> Tangent6 {
