@@ -1,6 +1,6 @@
 //! The fold written for every group, against the planar fold: in the plane, and in space with everything in one plane.
 
-#![allow(clippy::unwrap_used, reason = "a failed expectation is a failed test")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failed expectation is a failed test")]
 
 mod support;
 

@@ -176,8 +176,8 @@ fn off_oracle(seed: u64, noise: f64) -> (f64, f64) {
     let filter = oracle(&run);
     let covariance = joint.covariance().to_dense();
     let mut most = 0.0f64;
-    for (index, estimate) in estimates(&run, &joint).iter().enumerate() {
-        let theirs = filter.pose(RobotId(index as u32 + 1)).unwrap();
+    for (index, (estimate, robot)) in estimates(&run, &joint).iter().zip(1..).enumerate() {
+        let theirs = filter.pose(RobotId(robot)).unwrap();
         let off = pleiad_estimation::reference::spatial::log(&(theirs * matrix(&estimate.inverse())));
         for axis in 0..6 {
             let sigma = covariance[(6 * index + axis, 6 * index + axis)].sqrt();
@@ -308,7 +308,7 @@ fn drift(absolute: bool, seconds: i64) -> (f64, f64) {
     let runs = 100;
     let (mut found, mut stated) = (0.0, 0.0);
     for seed in 0..runs {
-        let run = run(seed, &Options { absolute, seconds, ..Options::default() });
+        let run = run(seed, &Options { seconds, absolute, ..Options::default() });
         let joint = at_the_end(&run, &ACCEPT);
         let estimates = estimates(&run, &joint);
         let share = 1.0 / estimates.len() as f64;

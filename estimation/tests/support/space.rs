@@ -97,7 +97,7 @@ pub fn run(seed: u64, options: &Options) -> Run {
         let prior =
             robots[index].truth.compose(&Pose3::exp(&noise6(PRIOR.map(|s| s * options.noise), &mut random)));
         let noise = Noise::from_sigmas(&PRIOR.map(|sigma| sigma * options.noise));
-        say(&mut run, &mut robots, index, Timestamp(0), Quantity::Absolute(Absolute3::Pose(prior)), noise);
+        say(&mut run, &mut robots, index, Timestamp(0), &Quantity::Absolute(Absolute3::Pose(prior)), &noise);
     }
     for tick in 1..=options.seconds * 1_000_000_000 / TICK_NS {
         for (robot, id) in robots.iter_mut().zip(1..) {
@@ -177,7 +177,7 @@ fn observe(
         let place = at(&robots[0], time).position();
         let z = place + Vector3::from(FIX.map(|sigma| sigma * options.noise * gaussian(random)));
         let noise = Noise::from_sigmas(&FIX.map(|sigma| sigma * options.noise));
-        return say(run, robots, observer, time, Quantity::Absolute(Absolute3::Position(z)), noise);
+        return say(run, robots, observer, time, &Quantity::Absolute(Absolute3::Position(z)), &noise);
     }
     let from = at(&robots[observer], time);
     let sigmas: Vec<f64> = SIGMAS[kind].iter().map(|sigma| sigma * options.noise).collect();
@@ -190,7 +190,7 @@ fn observe(
         let relative = reading(kind, &from.between(&at(&robots[other], time)), &sigmas, random);
         Quantity::Robot { robot: RobotId(other as u32 + 1), relative }
     };
-    say(run, robots, observer, time, quantity, Noise::from_sigmas(&sigmas));
+    say(run, robots, observer, time, &quantity, &Noise::from_sigmas(&sigmas));
 }
 
 fn reading(kind: usize, seen: &Pose3, sigmas: &[f64], random: &mut ChaCha8Rng) -> Relative3 {
@@ -219,18 +219,19 @@ fn say(
     robots: &mut [Robot],
     a: usize,
     time: Timestamp,
-    quantity: Quantity<Pose3, 6>,
-    noise: Noise<6>,
+    quantity: &Quantity<Pose3, 6>,
+    noise: &Noise<6>,
 ) {
     let state = |robot: &Robot| robot.trajectory.at(time).expect("within the last tick");
     let observer = state(&robots[a]);
     let other = match quantity {
-        Quantity::Robot { robot: RobotId(b), .. } => Some((BootIndex(0), state(&robots[b as usize - 1]))),
+        Quantity::Robot { robot: RobotId(b), .. } => Some((BootIndex(0), state(&robots[*b as usize - 1]))),
         Quantity::Landmark { .. } | Quantity::Absolute(_) => None,
     };
     let robot = RobotId(a as u32 + 1);
     let id = EntryId { robot, boot: BootIndex(0), sequence: Sequence(robots[a].said) };
     robots[a].said += 1;
+    let (quantity, noise) = (*quantity, *noise);
     let fact = Fact::Observation { quantity, noise, observer, other };
     run.facts.push((FactKey::observation(time, id), fact));
     run.events.push(Event::Observation(robot, quantity, noise));
