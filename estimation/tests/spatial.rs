@@ -8,16 +8,14 @@ mod space;
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
-use pleiad_estimation::fold::FactKey;
+use pleiad_estimation::RobotId;
 use pleiad_estimation::geometry::{LieGroup, Pose3, Square, Tangent6, Vector3};
 use pleiad_estimation::group_fold::{
-    Continuation, Fact, FactSet, FoldConfig, Insertion, Joint, Noise, NominalState, Outcome, Quantity,
-    Symmetric,
+    Fact, FactSet, FoldConfig, Insertion, Joint, Noise, NominalState, Outcome, Quantity, Symmetric,
 };
 use pleiad_estimation::reference::spatial::{Matrix, Seen, SpatialEkf, Target};
 use pleiad_estimation::spatial::{Absolute3, Relative3};
 use pleiad_estimation::statistics::NeesSummary;
-use pleiad_estimation::{BootIndex, RobotId, Timestamp};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -349,61 +347,4 @@ fn without_an_absolute_fix_the_common_drift_grows_and_with_one_it_does_not() {
     for (found, stated) in [(early, early_stated), (late, late_stated), (fixed, fixed_stated)] {
         assert!((0.65..1.4).contains(&(found / stated)), "{found} {stated}");
     }
-}
-
-// Boots.
-
-#[test]
-fn a_restart_without_a_gap_changes_nothing_and_a_lost_one_ends_the_robot() {
-    let run = run(5, &Options::default());
-    let own = |key: &FactKey| key.id.robot == RobotId(1);
-    let facts_of_1 = run.facts.iter().filter(|(key, _)| own(key)).collect::<Vec<_>>();
-    let (at, middle) = facts_of_1[facts_of_1.len() / 2];
-    let Fact::Observation { observer: last, .. } = middle else { panic!("an observation") };
-    let begin = Pose3::exp(&Tangent6::new(-2.0, 7.0, 1.0, 0.4, -0.2, 1.3));
-    let s = begin.compose(&last.nominal.inverse());
-    let moved = |state: &NominalState<Pose3, 6>| NominalState {
-        nominal: s.compose(&state.nominal),
-        noise_sum: state.noise_sum.minus(&last.noise_sum).congruence(&LieGroup::adjoint(&s)),
-    };
-    let split = |continuation| {
-        let mut set = FactSet::new();
-        let mut id = at.id;
-        id.boot = BootIndex(1);
-        let boot = Fact::Boot { nominal: begin, continuation };
-        set.insert(FactKey::boot(Timestamp(at.time.0 + 1), id), boot).unwrap();
-        for (key, fact) in &run.facts {
-            let Fact::Observation { quantity, noise, mut observer, mut other } = *fact else { continue };
-            let mut key = *key;
-            if key.time > at.time {
-                if own(&key) {
-                    key.id.boot = BootIndex(1);
-                    observer = moved(&observer);
-                }
-                if matches!(quantity, Quantity::Robot { robot: RobotId(1), .. }) {
-                    other = other.map(|(_, state)| (BootIndex(1), moved(&state)));
-                }
-            }
-            set.insert(key, Fact::Observation { quantity, noise, observer, other }).unwrap();
-        }
-        set.fold(&ACCEPT)
-    };
-    let (whole, records) = run.set().fold(&ACCEPT);
-    let carried = Continuation { previous: BootIndex(0), last: *last, gap: Symmetric::zero() };
-    let (joint, again) = split(Some(carried));
-    assert_eq!(again.len(), records.len() + 1);
-    let largest = whole.covariance().to_dense().amax();
-    assert!((joint.covariance().to_dense() - whole.covariance().to_dense()).amax() < 1e-10 * largest);
-    for ((_, a), (_, b)) in joint.members().zip(whole.members()) {
-        // Compared as poses: the corrections of the restarted robot apply to another nominal trajectory.
-        let (a, b) = (a.correction.compose(&a.nominal), b.correction.compose(&b.nominal));
-        assert!(a.between(&b).log().norm() < 1e-10);
-    }
-    let gap = Symmetric::from_sigmas([1.0, 1.0, 1.0, 0.2, 0.2, 0.2]);
-    let (wider, _) = split(Some(Continuation { gap, ..carried }));
-    let sum = |joint: &Joint<Pose3, 6>| joint.covariance().to_dense().trace();
-    assert!(sum(&wider) > sum(&joint));
-    let (lost, records) = split(None);
-    assert_eq!(lost.index(RobotId(1)), None);
-    assert!(records.iter().any(|(_, record)| matches!(record.outcome, Outcome::Skipped(_))));
 }
