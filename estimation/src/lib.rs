@@ -10,6 +10,7 @@
 pub mod fact;
 pub mod fold;
 pub mod geometry;
+pub mod group_fold;
 pub mod hypotheses;
 pub mod identity;
 pub mod joint;
@@ -23,6 +24,7 @@ pub mod reference;
 pub mod sample;
 pub mod single;
 pub mod slam;
+pub mod spatial;
 pub mod statistics;
 pub mod strategy;
 pub mod symmetric;

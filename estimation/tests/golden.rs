@@ -1,8 +1,11 @@
 //! The bits of a fold, to be the same on every processor. `.ci/golden-without-fma` runs this test once as
 //! it is and once with the processor's fused multiply-add masked, and compares what it prints.
 
+#[path = "support/space.rs"]
+mod space;
 mod support;
 
+use pleiad_estimation::group_fold::{FoldConfig, Outcome};
 use pleiad_estimation::ledger::Ledger;
 use support::{Options, team};
 
@@ -24,4 +27,13 @@ fn a_fold_of_every_kind_of_fact_gives_the_golden_bits() {
     let fingerprint = ledger.fingerprint().to_string();
     println!("golden {fingerprint}");
     assert_eq!(fingerprint, GOLDEN, "the fold's bits changed: raise FOLD_VERSION with the new hash");
+}
+
+#[test]
+fn a_fold_in_space_prints_its_bits() {
+    let run = space::run(1, &space::Options { robots: 5, seconds: 120, ..space::Options::default() });
+    let (joint, records) = run.set().fold(&FoldConfig::default());
+    let used = records.iter().filter(|(_, record)| record.outcome == Outcome::Used).count();
+    assert!(used > 500, "{used}");
+    println!("golden {}", joint.fingerprint());
 }

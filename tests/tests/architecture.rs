@@ -47,10 +47,12 @@ const ABSENCES: &[Absence] = &[
             "estimation/src/fact",
             "estimation/src/fold",
             "estimation/src/geometry",
+            "estimation/src/group_fold",
             "estimation/src/joint",
             "estimation/src/measurement",
             "estimation/src/motion",
             "estimation/src/nominal",
+            "estimation/src/spatial",
         ],
         except: &[],
         words: &[

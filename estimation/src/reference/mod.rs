@@ -3,6 +3,7 @@
 //!
 //! - [`JointEkf`] folds a set of facts, in the invariant or the additive error;
 //! - [`PerTickEkf`] is the textbook joint filter that steps every robot at every odometry tick;
+//! - [`spatial::SpatialEkf`] is the textbook joint filter in space, with numerical derivatives;
 //! - [`RoumeliotisBekey`] is the published distributed form, each robot keeping its row of factors.
 //!
 //! Dense matrices of dynamic size, trigonometry of the standard library, the full Joseph form:
@@ -14,6 +15,7 @@ mod joint_ekf;
 mod models;
 mod per_tick;
 mod roumeliotis_bekey;
+pub mod spatial;
 
 pub use facts::{FactContent, Measurement, ReferenceFact, State, facts_from_entries};
 pub use joint::JointCovariance;
