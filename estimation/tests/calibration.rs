@@ -1,6 +1,7 @@
 //! What is uncertain besides poses, estimated with them: odometry that errs, sensors that sit elsewhere, clocks that are wrong.
 
 #![allow(clippy::cast_possible_truncation, clippy::expect_used, reason = "a fixture")]
+#![allow(clippy::print_stdout, reason = "figures for the documentation")]
 
 mod support;
 

@@ -8,7 +8,7 @@ use pleiad_estimation::fact::{Absolute, Entry, Quantity as PlanarQuantity};
 use pleiad_estimation::fold::{FactKey, FoldConfig as PlanarConfig};
 use pleiad_estimation::geometry::{Pose3, Square, Tangent, Vector2, Vector3};
 use pleiad_estimation::group_fold::{
-    Continuation, Fact, FactSet, FoldConfig, Joint, NominalState, Noise, Outcome, Quantity, Space, Symmetric,
+    Continuation, Fact, FactSet, FoldConfig, Joint, Noise, NominalState, Outcome, Quantity, Space, Symmetric,
 };
 use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::reference::{FactContent, Measurement, facts_from_entries};
@@ -89,7 +89,8 @@ fn check_plane(seed: u64, options: &Options) -> usize {
     let (joint, records) = in_the_plane(&team.entries).fold(&FoldConfig::default());
     let planar = ledger(&team.entries, options.config);
     assert_eq!(joint.members().count(), planar.joint().members().count());
-    let largest = planar.joint().covariance().lower().iter().fold(0.0f64, |most, entry| most.max(entry.abs()));
+    let largest =
+        planar.joint().covariance().lower().iter().fold(0.0f64, |most, entry| most.max(entry.abs()));
     for (ours, theirs) in joint.covariance().lower().iter().zip(planar.joint().covariance().lower()) {
         assert!((ours - theirs).abs() <= TOLERANCE * largest, "seed {seed}: {ours} {theirs}");
     }
@@ -206,7 +207,9 @@ fn in_space_a_team_in_one_plane_gives_the_numbers_of_the_planar_fold() {
             for (j, other) in joint.members() {
                 let (k, l) = (planar.index(member.robot).unwrap(), planar.index(other.robot).unwrap());
                 let theirs = planar.covariance().block(k, l);
-                assert!((part(&joint, i, j) - theirs).norm() < 1e-10 * planar.covariance().block(0, 0).norm());
+                assert!(
+                    (part(&joint, i, j) - theirs).norm() < 1e-10 * planar.covariance().block(0, 0).norm()
+                );
             }
         }
     }

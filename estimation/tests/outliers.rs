@@ -1,6 +1,7 @@
 //! Sightings of nothing: any range and any bearing, as likely as any other.
 
 #![allow(clippy::expect_used, reason = "a fixture")]
+#![allow(clippy::print_stdout, reason = "figures for the documentation")]
 
 mod support;
 

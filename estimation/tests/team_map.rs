@@ -1,6 +1,7 @@
 //! Landmarks whose places nobody knows, found by the team in the joint of its poses.
 
 #![allow(clippy::expect_used, reason = "a fixture")]
+#![allow(clippy::print_stdout, reason = "figures for the documentation")]
 
 mod support;
 

@@ -1,6 +1,7 @@
 //! Robots that do not know where they start, and find out from what they see of one another.
 
 #![allow(clippy::expect_used, reason = "a fixture")]
+#![allow(clippy::print_stdout, reason = "figures for the documentation")]
 
 mod support;
 

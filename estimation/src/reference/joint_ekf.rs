@@ -164,6 +164,7 @@ impl JointEkf {
 
 /// A robot that has booted.
 #[derive(Clone, Copy)]
+#[allow(clippy::large_enum_variant, reason = "nearly all are placed")]
 enum Member {
     Unplaced(BootIndex),
     Placed(RobotEstimate),

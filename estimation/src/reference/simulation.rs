@@ -89,7 +89,7 @@ pub fn observe(template: &Quantity, observer: &Pose2, observed: Option<&Pose2>) 
             position_m: *position_m,
             relative: seen(relative, &Pose2::new(position_m[0], position_m[1], 0.0)),
         },
-        Quantity::Feature { .. } => template.clone(),
+        Quantity::Feature { .. } => *template,
         Quantity::Absolute(absolute) => Quantity::Absolute(match absolute {
             Absolute::Pose(_) => Absolute::Pose(*observer),
             Absolute::Position(_) => Absolute::Position([observer.x_m(), observer.y_m()]),
@@ -183,8 +183,8 @@ impl Logs {
         id
     }
 
-    pub fn boot(&mut self, robot: RobotId, boot: Boot, index: u32) -> EntryId {
-        self.push(robot, BootIndex(index), Body::Boot(boot))
+    pub fn boot(&mut self, robot: RobotId, boot: &Boot, index: u32) -> EntryId {
+        self.push(robot, BootIndex(index), Body::Boot(*boot))
     }
 
     /// A plain first boot at time 0 with the nominal pose at the origin.
@@ -197,7 +197,7 @@ impl Logs {
             continuation: None,
             calibration: None,
         };
-        self.boot(robot, boot, 0)
+        self.boot(robot, &boot, 0)
     }
 
     /// An observation with its half, both in boot 0.

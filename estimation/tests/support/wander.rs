@@ -1,7 +1,13 @@
 //! A team that wanders, and how what it does becomes readings. It knows of no derivative and no covariance: what it says is
 //! true is an independent source for what the filter finds.
 
-#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, missing_docs, reason = "a fixture")]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    reason = "a fixture"
+)]
+#![allow(missing_docs, reason = "a fixture")]
 
 use pleiad_estimation::fact::{
     Absolute, Answer, Body, Boot, Calibration, Entry, EntryId, Half, Noise, NoiseRef, Observation, Quantity,
@@ -149,7 +155,7 @@ pub fn run(
         let nominal = NominalTrajectory::new(Timestamp(0), Pose2::identity(), usize::MAX).calibrated();
         let mut robot = Robot { wrong: *wrong, told: *told, truth, trajectory: nominal, entries: Vec::new() };
         let first = BEFORE - wrong.late_ticks;
-        for tick in 0..ticks + 1 {
+        for tick in 0..=ticks {
             let [x, y, yaw] = NOISE.map(|sigma| (world.slip * sigma).powi(2) * TICK_S);
             robot.trajectory.extend(&Step {
                 from: Timestamp(tick * TICK_NS),

@@ -236,7 +236,7 @@ fn facts_of_robots_without_a_place_or_of_another_boot_are_skipped() {
         continuation: None,
         calibration: None,
     };
-    logs.boot(ONE, restart, 1);
+    logs.boot(ONE, &restart, 1);
     let stale = logs.observation(ONE, at(3.0), heading, explicit(&[0.1]), origin, None);
     let estimate = fold(ErrorForm::Invariant, &logs);
     for (id, reason) in [
@@ -301,7 +301,7 @@ fn split_run(gap: Symmetric3) -> (Logs, Logs) {
     let nominal = shift.compose(&broken.nominal);
     split.boot(
         ONE,
-        Boot {
+        &Boot {
             time: at(2.0),
             nonce: 2,
             configuration: 0,
@@ -373,7 +373,7 @@ fn a_lost_boot_forgets_that_robot_and_keeps_the_marginal_of_the_others() {
             continuation: None,
             calibration: None,
         };
-        logs.boot(ONE, restart, 1);
+        logs.boot(ONE, &restart, 1);
         let after = fold(form, &logs);
         assert_eq!(after.covariance.robots(), [TWO]);
         assert_eq!(after.covariance.block(TWO, TWO), before.covariance.block(TWO, TWO));

@@ -11,8 +11,8 @@ impl Factor {
         for row in 0..w.len() {
             for column in 0..=row {
                 let mut sum = w[row][column];
-                for k in 0..column {
-                    sum -= w[row][k] * w[column][k];
+                for (a, b) in w[row].iter().zip(&w[column]).take(column) {
+                    sum -= a * b;
                 }
                 if row == column {
                     if !(sum > 0.0 && sum.is_finite()) {
