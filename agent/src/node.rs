@@ -321,7 +321,7 @@ impl Node {
             Body::Half(Half { answer: Answer::State { state, .. }, .. }) => state.sensitivity,
             _ => None,
         };
-        let odometry = self.config.calibration.is_some_and(|of| of.motion != [0.0; 3]);
+        let odometry = self.config.calibration.is_some_and(|of| of.motion.iter().any(|sigma| *sigma > 0.0));
         let extension = state.map_or_else(Vec::new, |mut sensitivity| {
             if !odometry {
                 sensitivity.motion.fill(0.0);

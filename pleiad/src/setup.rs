@@ -231,9 +231,8 @@ pub fn recorded(recording: &Recording, options: &ReplayOptions) -> anyhow::Resul
     }
     let mut recording = recording.slice(start, end);
     recording = match options.landmarks {
-        LandmarksArg::Known => recording,
+        LandmarksArg::Known | LandmarksArg::Team => recording,
         LandmarksArg::None => recording.with_landmarks(&BTreeSet::new()),
-        LandmarksArg::Team => recording,
         LandmarksArg::Only(ids) => {
             if let Some(unknown) = ids.iter().find(|id| !recording.landmarks.contains_key(id)) {
                 let known: Vec<_> = recording.landmarks.keys().map(ToString::to_string).collect();

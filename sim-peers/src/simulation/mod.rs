@@ -22,6 +22,7 @@ pub use pleiad_estimation::ledger::Planted;
 pub use run::{Hour, Outcome, operate, run};
 
 /// What is simulated besides what the seed decides.
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// A mistake in every node.

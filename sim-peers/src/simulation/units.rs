@@ -32,13 +32,13 @@ fn state(of: NominalState, scale: f64) -> NominalState {
     NominalState::new(pose(&of.nominal, scale), symmetric(of.noise_sum, scale))
 }
 
-fn boot(of: Boot, scale: f64) -> Boot {
+fn boot(of: &Boot, scale: f64) -> Boot {
     let continuation = of.continuation.map(|mut from| {
         from.last = state(from.last, scale);
         from.gap = symmetric(from.gap, scale);
         from
     });
-    Boot { nominal: pose(&of.nominal, scale), continuation, ..of }
+    Boot { nominal: pose(&of.nominal, scale), continuation, ..*of }
 }
 
 /// What was seen, and the scales of its components.
@@ -93,7 +93,7 @@ fn measurement(of: &Measurement, scale: f64) -> Measurement {
 /// Facts in units of `1 / scale` metres.
 pub fn in_units(facts: &[ReferenceFact], scale: f64) -> Vec<ReferenceFact> {
     let content = |content: &FactContent| match content {
-        FactContent::Boot(begun) => FactContent::Boot(boot(*begun, scale)),
+        FactContent::Boot(begun) => FactContent::Boot(boot(begun, scale)),
         FactContent::Measurement(measured) => FactContent::Measurement(measurement(measured, scale)),
     };
     facts.iter().map(|fact| ReferenceFact { content: content(&fact.content), ..fact.clone() }).collect()
