@@ -25,6 +25,8 @@ const WORST_SHARE: f64 = 0.25;
 const COST_APART: f64 = 12.0;
 /// Where some ties may be of nothing, so many numbers beyond three must agree.
 const REDUNDANCY_IN_CLUTTER: usize = 5;
+/// A minimum found with each tie for itself that is so much less likely is not looked at more closely.
+const HOPELESS: f64 = 100.0;
 /// Minima that are no farther apart are one.
 const SAME_M: f64 = 0.3;
 const SAME_RAD: f64 = 0.1;
@@ -122,7 +124,8 @@ impl Problem<'_> {
         let mut distinct: Vec<Minimum> = Vec::new();
         for minimum in rough {
             let new = distinct.iter().all(|known| self.are_apart(&known.transform, &minimum.transform));
-            if new && distinct.len() < MOST_MINIMA {
+            let hopeless = distinct.first().is_some_and(|best| minimum.cost > best.cost + HOPELESS);
+            if new && !hopeless && distinct.len() < MOST_MINIMA {
                 distinct.push(minimum);
             }
         }
@@ -305,6 +308,9 @@ impl Problem<'_> {
             last = cost;
             let step = solve3(&information, &along)?;
             transform = Pose2::exp(limited(step)).compose(&transform);
+            if is_at_rest(&step, 1e-6) {
+                break;
+            }
         }
         last.is_finite().then_some(Minimum { transform, cost: last })
     }
@@ -316,11 +322,13 @@ impl Problem<'_> {
         for _ in 0..ITERATIONS {
             let step = self.step(&transform)?;
             transform = Pose2::exp(limited(step.tau)).compose(&transform);
+            let done = is_at_rest(&step.tau, 1e-6);
             last = Some(step);
+            if done {
+                break;
+            }
         }
-        let step = last.filter(|step| {
-            step.tau.x.abs() <= 1e-3 && step.tau.y.abs() <= 1e-3 && step.tau.z.abs() <= 1e-4
-        })?;
+        let step = last.filter(|step| is_at_rest(&step.tau, 1e-3))?;
         let cost = dot(&step.left, &step.left);
         let placement = Placement {
             transform,
@@ -402,6 +410,11 @@ impl Problem<'_> {
         let misfits: Vec<f64> = rows.iter().zip(&self.ties).map(misfit).collect();
         (0..misfits.len()).max_by(|a, b| misfits[*a].total_cmp(&misfits[*b]))
     }
+}
+
+/// A step no longer than so many metres, and a tenth as many radians.
+fn is_at_rest(step: &Vector3, longest_m: f64) -> bool {
+    step.x.abs() <= longest_m && step.y.abs() <= longest_m && step.z.abs() <= 0.1 * longest_m
 }
 
 fn limited(step: Vector3) -> Vector3 {
