@@ -69,6 +69,11 @@ pub fn maximize(
         }
         let promised = step.dot(&gradient);
         if promised < tolerance {
+            if inverse.is_some() {
+                // The curvature learned on the way may only have gone small: the scores have the last word.
+                (inverse, last) = (None, None);
+                continue;
+            }
             let x = x.as_slice().to_vec();
             return Maximum { x, value, converged: true, evaluations };
         }
