@@ -27,7 +27,11 @@ pub fn key(level: Level) -> &'static str {
 }
 
 /// Where a configuration keeps a level; `None` for a sensor that it does not list.
-fn slot<'a>(motion: &'a mut MotionSection, sensors: &'a mut SensorsSection, level: Level) -> Option<&'a mut f64> {
+fn slot<'a>(
+    motion: &'a mut MotionSection,
+    sensors: &'a mut SensorsSection,
+    level: Level,
+) -> Option<&'a mut f64> {
     match level {
         Level::Forward => Some(&mut motion.forward_m_per_sqrt_s),
         Level::Lateral => Some(&mut motion.lateral_m_per_sqrt_s),

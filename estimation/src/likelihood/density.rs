@@ -37,13 +37,11 @@ pub fn scores(facts: &[TunableFact], levels: &Levels, config: &FoldConfig) -> Ve
 fn score(joint: &mut Joint, config: &FoldConfig, key: &FactKey, fact: &Fact) -> Option<FactScore> {
     let predicted = match fact {
         Fact::Boot(_) => None,
-        Fact::Observation { quantity, noise, observer, other } => {
-            noise.as_ref().and_then(|noise| {
-                let noise = measurement::noise_matrix(noise);
-                let of = predict(joint, key, quantity, &noise, observer, other.as_ref());
-                of.map(|predicted| (predicted, quantity))
-            })
-        }
+        Fact::Observation { quantity, noise, observer, other } => noise.as_ref().and_then(|noise| {
+            let noise = measurement::noise_matrix(noise);
+            let of = predict(joint, key, quantity, &noise, observer, other.as_ref());
+            of.map(|predicted| (predicted, quantity))
+        }),
     };
     let residual = fold(joint, config, key, fact);
     let ((nis, log_normal), quantity) = predicted?;

@@ -18,7 +18,10 @@ pub struct UnitTrajectory {
 
 impl UnitTrajectory {
     /// Of the ticks of a trajectory, by time; `quiet_at_standstill` as in [`MotionNoise`](crate::motion::MotionNoise).
-    pub fn new(ticks: impl IntoIterator<Item = (Timestamp, NominalState)>, quiet_at_standstill: bool) -> Self {
+    pub fn new(
+        ticks: impl IntoIterator<Item = (Timestamp, NominalState)>,
+        quiet_at_standstill: bool,
+    ) -> Self {
         let mut ticks = ticks.into_iter();
         let mut units = Vec::new();
         let Some((mut before, mut last)) = ticks.next() else { return Self { ticks: units } };

@@ -71,7 +71,8 @@ pub fn information(evaluate: &Evaluate, x: &[f64], value: f64) -> Information {
         .collect();
     let outer = outer_product(evaluate, x);
     // Steps over which the log-likelihood falls by about a half, so that rounding and roughness do not matter.
-    let steps: Vec<f64> = (0..size).map(|j| (1.0 / outer[(j, j)].max(1e-9).sqrt()).clamp(0.02, 0.5)).collect();
+    let steps: Vec<f64> =
+        (0..size).map(|j| (1.0 / outer[(j, j)].max(1e-9).sqrt()).clamp(0.02, 0.5)).collect();
     let kept: Vec<usize> = (0..size).filter(|j| bounded[*j] == [true; 2]).collect();
     let hessian = hessian(&totals, &moved, &kept, &steps, value);
     let restricted = DMatrix::from_fn(kept.len(), kept.len(), |a, b| outer[(kept[a], kept[b])]);
@@ -83,7 +84,9 @@ pub fn information(evaluate: &Evaluate, x: &[f64], value: f64) -> Information {
         .into_iter()
         .map(|bounded| Range { standard_error: None, robust_error: None, falls: [0.0; 2], bounded })
         .collect();
-    let (Some(covariance), Some(robust)) = (covariance, robust) else { return Information { ranges, definite } };
+    let (Some(covariance), Some(robust)) = (covariance, robust) else {
+        return Information { ranges, definite };
+    };
     let mut ends = Vec::with_capacity(2 * kept.len());
     for a in 0..kept.len() {
         let error = covariance[(a, a)].sqrt();
@@ -134,8 +137,7 @@ fn hessian(
     let sides: Vec<Vec<f64>> =
         kept.iter().flat_map(|j| [moved(&[(*j, steps[*j])]), moved(&[(*j, -steps[*j])])]).collect();
     let sides = totals(&sides);
-    let pairs: Vec<(usize, usize)> =
-        (0..kept.len()).flat_map(|a| (0..a).map(move |b| (a, b))).collect();
+    let pairs: Vec<(usize, usize)> = (0..kept.len()).flat_map(|a| (0..a).map(move |b| (a, b))).collect();
     let corners: Vec<Vec<f64>> = pairs
         .iter()
         .flat_map(|(a, b)| {
@@ -169,7 +171,8 @@ mod tests {
         let evaluate = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
             let one = |x: &Vec<f64>| {
                 // Squares with mean 1 and the spread of chi-square, so that scores are like those of normal variables.
-                let of = |k: usize| if k.is_multiple_of(2) { 1.0 + 2.0_f64.sqrt() } else { 1.0 - 2.0_f64.sqrt() };
+                let of =
+                    |k: usize| if k.is_multiple_of(2) { 1.0 + 2.0_f64.sqrt() } else { 1.0 - 2.0_f64.sqrt() };
                 (0..count).map(|k| -x[0] - 0.5 * of(k) * (-2.0 * x[0]).exp()).collect()
             };
             points.iter().map(one).collect()

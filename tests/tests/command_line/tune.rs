@@ -200,7 +200,10 @@ fn what_cannot_be_tuned_is_refused_with_what_to_do() {
         (&["--noise", "additive.toml"], &["filter.error", "invariant"]),
         (&["--noise", "calibrated.toml"], &["[calibration]", "take the table out"]),
         (&["--noise", "noise.toml", "--also", "sensors.bearing.sigma_rad"], &["sensors.bearing.sigma_rad"]),
-        (&["--noise", "noise.toml", "--also", "motion.sideways"], &["motion.sideways", "motion.lateral_m_per_sqrt_s"]),
+        (
+            &["--noise", "noise.toml", "--also", "motion.sideways"],
+            &["motion.sideways", "motion.lateral_m_per_sqrt_s"],
+        ),
         (&["--noise", "absent.toml"], &["absent.toml"]),
     ] {
         let stderr = run(folder.path(), ["tune", "recording"].iter().chain(arguments)).failure();

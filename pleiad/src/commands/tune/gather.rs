@@ -51,7 +51,10 @@ pub fn gather(team: &Team) -> anyhow::Result<Gathered> {
     let (_, last) = team.span().context("there is not a single sample in the recording")?;
     let mut notes = team.notes.clone();
     if !fleet.settle(last, SETTLING_ROUNDS) {
-        notes.push("the robots did not agree at the end: some observations stayed without their other half".to_owned());
+        notes.push(
+            "the robots did not agree at the end: some observations stayed without their other half"
+                .to_owned(),
+        );
     }
     let outcomes = fleet.into_outcomes();
     let mut units = BTreeMap::new();
@@ -64,7 +67,8 @@ pub fn gather(team: &Team) -> anyhow::Result<Gathered> {
     let ledger = outcomes.values().next().context("there is no robot in the recording")?.node.ledger();
     let mut facts = Vec::new();
     for (key, record) in ledger.facts() {
-        let units = |robot, boot, time| units.get(&(robot, boot)).and_then(|own: &UnitTrajectory| own.at(time));
+        let units =
+            |robot, boot, time| units.get(&(robot, boot)).and_then(|own: &UnitTrajectory| own.at(time));
         let fact = TunableFact::new(*key, record.fact, units).with_context(|| {
             format!(
                 "the trajectory of robot {} is no longer kept at {:.1} s: raise motion.history_samples",

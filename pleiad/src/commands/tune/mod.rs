@@ -59,8 +59,10 @@ pub fn run(args: &TuneArgs) -> anyhow::Result<()> {
             start[*level] = BEGINNING;
         }
     }
-    let (free, zero): (Vec<Level>, Vec<Level>) =
-        there.into_iter().filter(|level| gathered.stated.contains(level)).partition(|level| start[*level] > 0.0);
+    let (free, zero): (Vec<Level>, Vec<Level>) = there
+        .into_iter()
+        .filter(|level| gathered.stated.contains(level))
+        .partition(|level| start[*level] > 0.0);
     let candidates = if args.also == AlsoArg::Auto { zero } else { Vec::new() };
     let reach_m = largest_reading_m(&gathered.facts).unwrap_or(1.0);
     let said = |what: String| spinner.set_message(format!("{}: {what}", recording.name));

@@ -184,19 +184,18 @@ fn row(
         point[index] = tried.ln();
         value - problem.densities(&point).iter().sum::<f64>()
     };
-    let at_most = (!range.bounded[0] && range.bounded[1]).then(|| {
-        let mut most = found;
-        // Ends, because the likelihood falls at 55 times the value found.
-        while fall(most * 1.1) < FALL {
-            most *= 1.1;
-        }
-        most
-    });
+    let at_most = if range.bounded[0] { None } else { most(found, &fall) };
     let kept = !determined && start > 0.0 && fall(start) < FALL;
+    let value = match at_most {
+        _ if kept => start,
+        // As likely as the best, and not absurdly small.
+        Some(most) if !determined => 0.5 * most,
+        _ => found,
+    };
     LevelJson {
         key: levels::key(level),
         start,
-        value: if kept { start } else { found },
+        value,
         interval_95: range.interval(x[index]).filter(|_| determined).map(|ends| ends.map(f64::exp)),
         standard_error: range.standard_error.filter(|_| determined),
         robust_error: range.robust_error.filter(|_| determined),
@@ -206,12 +205,33 @@ fn row(
     }
 }
 
+/// The largest value that is as good as the best, of a level that may be far smaller than `found`.
+fn most(found: f64, fall: &dyn Fn(f64) -> f64) -> Option<f64> {
+    let mut most = found;
+    // A coarse step first: what was found may be anything below.
+    for factor in [4.0, 1.1] {
+        let mut steps = 0;
+        while fall(most * factor) < FALL {
+            most *= factor;
+            steps += 1;
+            if steps > 30 {
+                return None;
+            }
+        }
+    }
+    Some(most)
+}
+
 fn undetermined(row: &LevelJson) -> String {
     let what = match row.at_most {
         Some(most) => format!("the data only say that it is at most {}", super::words::short(most)),
         None => "the data do not determine it".to_owned(),
     };
-    let then = if row.value == row.start { "it keeps its value" } else { "it is written as it was found" };
+    let then = match row.at_most {
+        _ if row.value.to_bits() == row.start.to_bits() => "it keeps its value",
+        Some(_) => "half of that is written",
+        None => "it is written as it was found",
+    };
     format!("{}: {what}; {then}", row.key)
 }
 
@@ -219,7 +239,8 @@ fn judge(facts: &[TunableFact], levels: &Levels, replayed: &FoldConfig, reach_m:
     // The levels as they are, the share of outliers that suits them.
     let only = Problem::new(facts, *levels, Vec::new(), reach_m);
     let (lower, upper) = only.bounds();
-    let best = maximize(&search::evaluator(&only), &only.point(levels, search::SHARE), (&lower, &upper), 0.01);
+    let best =
+        maximize(&search::evaluator(&only), &only.point(levels, search::SHARE), (&lower, &upper), 0.01);
     let config = FoldConfig { relinearize: None, ..*replayed };
     let scores: Vec<_> = scores(facts, levels, &config).into_iter().flatten().collect();
     let all = NisSummary::from_values(scores.iter().map(|score| (score.nis, score.dimension)));
@@ -281,7 +302,10 @@ pub const ALL: &str = "all";
 pub fn write(out: &Path, json: &TuneJson) -> anyhow::Result<()> {
     for (robot, text) in &json.noise {
         let path = if robot == ALL { out.to_owned() } else { beside(out, robot) };
-        let text = format!("# Noise levels under which {} is likeliest:\n# {}\n\n{text}", json.recording, json.command);
+        let text = format!(
+            "# Noise levels under which {} is likeliest:\n# {}\n\n{text}",
+            json.recording, json.command
+        );
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(())

@@ -161,7 +161,8 @@ fn widened<'a>(
     let free: Vec<Level> = problem.free().iter().copied().chain([level]).collect();
     let wider = Problem::new(facts, with(TRIED[2]), free, reach_m);
     let points: Vec<Vec<f64>> = TRIED.iter().map(|value| wider.point(&with(*value), share)).collect();
-    let values: Vec<f64> = evaluator(&wider)(&points).iter().map(|densities| densities.iter().sum()).collect();
+    let values: Vec<f64> =
+        evaluator(&wider)(&points).iter().map(|densities| densities.iter().sum()).collect();
     let (first, value) = points
         .into_iter()
         .zip(values)

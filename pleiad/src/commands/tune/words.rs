@@ -80,7 +80,8 @@ pub fn text(json: &TuneJson) -> String {
     }
     for one in &json.tried {
         let verdict = if one.kept { "taken in" } else { "left out" };
-        let _ = writeln!(text, "{}: raises the log-likelihood by {:.1}, {verdict}", one.key, one.gain.max(0.0));
+        let _ =
+            writeln!(text, "{}: raises the log-likelihood by {:.1}, {verdict}", one.key, one.gain.max(0.0));
     }
     for note in &json.notes {
         let _ = writeln!(text, "note: {note}");
