@@ -3,6 +3,7 @@
 mod calibration;
 mod checks;
 mod model;
+mod noises;
 mod sections;
 mod strategy_name;
 
@@ -23,10 +24,11 @@ use serde::{Deserialize, Serialize};
 pub use calibration::{CalibrationSection, ClutterSection};
 use checks::{finite, not_negative, positive, value};
 pub use model::RobotCorrection;
+pub use noises::{AngleNoise, LengthNoise, PoseNoise, RangeBearingNoise, RangeNoise};
 pub use sections::{
-    AngleNoise, BusMode, BusSection, ClockSection, ErrorName, FaultsSection, FilterSection, LandmarkRow,
-    LedgerSection, LengthNoise, MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise,
-    RelinearizeSection, SensorsSection, UnknownLandmarks, VelocityName, YawName,
+    BusMode, BusSection, ClockSection, ErrorName, FaultsSection, FilterSection, LandmarkRow, LedgerSection,
+    MotionSection, OutputSection, PriorSection, RelinearizeSection, SensorsSection, UnknownLandmarks,
+    VelocityName, YawName,
 };
 
 /// Why a configuration cannot be used.
@@ -276,6 +278,9 @@ impl AgentConfig {
         positive("bus.status_period_s", self.bus.status_period_s)?;
         not_negative("output.fsync_period_s", self.output.fsync_period_s)?;
         self.sensors.check()?;
+        if let Some(key) = self.sensors.growing().filter(|_| self.strategy != StrategyKind::Exact) {
+            self.needs_facts(key)?;
+        }
         self.check_strategy()?;
         let correction = self.correction()?;
         let mut sensors = self.sensors.clone();

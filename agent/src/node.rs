@@ -21,7 +21,8 @@ pub use views::SettledEstimate;
 use closing::Membership;
 use corrector::Corrector;
 use pleiad_estimation::fact::{
-    Answer, Body, Entry, EntryId, Half, LogId, NoiseRef, Observation, VoidReason, extension_of_state,
+    Answer, Body, Entry, EntryId, Half, LogId, NoiseRef, Observation, Quantity, VoidReason,
+    extension_of_state,
 };
 use pleiad_estimation::ledger::{Insertion, Ledger, Refusal};
 use pleiad_estimation::motion::DeadReckoning;
@@ -375,7 +376,13 @@ impl Node {
         if self.config.sensors.profiles()[usize::from(profile)].is_none() {
             return Err(SampleRefusal::NoNoise { kind: SensorsSection::profile_name(profile) });
         }
-        let noise = NoiseRef::Profile(profile);
+        let varying = match &quantity {
+            Quantity::Robot { relative, .. }
+            | Quantity::Landmark { relative, .. }
+            | Quantity::Feature { relative, .. } => self.config.sensors.varying_noise(relative),
+            Quantity::Absolute(_) => None,
+        };
+        let noise = varying.map_or(NoiseRef::Profile(profile), NoiseRef::Explicit);
         self.say(boot, Body::Observation(Observation { time: sample.time, quantity, noise, observer }));
         Ok(())
     }

@@ -172,6 +172,9 @@ fn documented_defaults_are_the_defaults() {
     for key in ["prior.for_boot", "faults.seed"] {
         defaults.insert(key.to_owned(), Value::Integer(0));
     }
+    for key in ["sensors.range.sigma_per_m", "sensors.range_bearing.sigma_range_per_m"] {
+        defaults.insert(key.to_owned(), Value::Float(0.0));
+    }
     for key in ["filter.relinearize.block_s", "filter.relinearize.ahead_s"] {
         defaults.insert(key.to_owned(), Value::Float(5.0));
     }
@@ -314,6 +317,18 @@ fn a_value_out_of_its_range_is_refused_with_file_key_and_what_would_be_right() {
         ),
         (sensor("range_bias_m = inf"), "sensors.range_bias_m = inf", finite),
         (sensor("range = { sigma_m = inf }"), "sensors.range.sigma_m = inf", positive),
+        (
+            sensor("range = { sigma_m = 0.1, sigma_per_m = -0.1 }"),
+            "sensors.range.sigma_per_m = -0.1",
+            not_negative,
+        ),
+        (
+            sensor(
+                "range_bearing = { sigma_range_m = 0.1, sigma_range_per_m = nan, sigma_bearing_rad = 1.0 }",
+            ),
+            "sensors.range_bearing.sigma_range_per_m = NaN",
+            not_negative,
+        ),
         (sensor("bearing = { sigma_rad = 0.0 }"), "sensors.bearing.sigma_rad = 0", positive),
         (
             sensor("range_bearing = { sigma_range_m = 0.1, sigma_bearing_rad = -1.0 }"),

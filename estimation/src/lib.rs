@@ -15,6 +15,7 @@ pub mod hypotheses;
 pub mod identity;
 pub mod joint;
 pub mod ledger;
+pub mod likelihood;
 pub mod linear;
 pub mod measurement;
 pub mod motion;

@@ -4,6 +4,7 @@ mod calibrate;
 mod evaluate;
 mod slam;
 mod survey;
+mod tune;
 mod values;
 
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
 pub use evaluate::{EvaluateArgs, VariantArg, VariantFilter};
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
+pub use tune::{AlsoArg, TuneArgs};
 pub use values::{AbsoluteArg, CalibrateArg, ClutterArg, LandmarksArg, RelinearizeArg, ToldArg};
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
@@ -35,6 +37,8 @@ pub enum Command {
     Run(RunArgs),
     /// Replay a recording through the agents of a team.
     Replay(ReplayArgs),
+    /// Noise levels from a recording, without its ground truth: those under which its innovations are likeliest.
+    Tune(TuneArgs),
     /// What a scenario or a recording lets the team know of itself.
     Observability(ObservabilityArgs),
     /// A recording of a scenario; or what the nominal model predicts of one, and what was measured instead.

@@ -4,6 +4,7 @@ mod cli;
 mod commands;
 mod evaluation;
 mod folder;
+mod levels;
 mod output;
 mod payload;
 mod setup;

@@ -386,6 +386,7 @@ fn noise_for(robot: RobotId, recording: &Recording, options: &ReplayOptions) -> 
             range_bearing: (noise.range_sigma_m > 0.0 && noise.bearing_sigma_rad > 0.0).then_some(
                 RangeBearingNoise {
                     sigma_range_m: noise.range_sigma_m,
+                    sigma_range_per_m: 0.0,
                     sigma_bearing_rad: noise.bearing_sigma_rad,
                 },
             ),

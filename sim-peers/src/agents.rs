@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use pleiad_agent::config::{
     AngleNoise, BusSection, ClockSection, FilterSection, LandmarkRow, LedgerSection, LengthNoise,
-    MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, SensorsSection,
+    MotionSection, OutputSection, PoseNoise, PriorSection, RangeBearingNoise, RangeNoise, SensorsSection,
 };
 use pleiad_agent::{AgentConfig, ConfigError, NodeConfig};
 use pleiad_estimation::RobotId;
@@ -51,10 +51,12 @@ pub fn sensors(settings: &RobotSettings) -> SensorsSection {
         // A sensor of poses gives the position of a landmark, which has no heading.
         relative_position: (is(RelativeKind::Position) || is(RelativeKind::Pose))
             .then_some(length(relative.sigma_position_m)),
-        range: is(RelativeKind::Range).then_some(length(relative.sigma_range_m)),
+        range: is(RelativeKind::Range)
+            .then_some(RangeNoise { sigma_m: relative.sigma_range_m, sigma_per_m: 0.0 }),
         bearing: is(RelativeKind::Bearing).then_some(AngleNoise { sigma_rad: relative.sigma_bearing_rad }),
         range_bearing: is(RelativeKind::RangeBearing).then_some(RangeBearingNoise {
             sigma_range_m: relative.sigma_range_m,
+            sigma_range_per_m: 0.0,
             sigma_bearing_rad: relative.sigma_bearing_rad,
         }),
         gps: (settings.gps.rate_hz > 0.0).then_some(length(settings.gps.sigma_m)),

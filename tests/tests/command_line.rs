@@ -20,6 +20,8 @@ mod json;
 mod models;
 #[path = "command_line/simulate.rs"]
 mod simulate;
+#[path = "command_line/tune.rs"]
+mod tune;
 
 use std::path::Path;
 

@@ -10,10 +10,9 @@ use pleiad_estimation::strategy::StrategyKind;
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 
 use super::sections::{
-    AngleNoise, ClockSection, ErrorName, LedgerSection, LengthNoise, MotionSection, PriorSection,
-    SensorsSection, YawName,
+    ClockSection, ErrorName, LedgerSection, MotionSection, PriorSection, SensorsSection, YawName,
 };
-use super::{AgentConfig, ClosingConfig, ConfigError, Prior};
+use super::{AgentConfig, AngleNoise, ClosingConfig, ConfigError, LengthNoise, Prior};
 
 impl AgentConfig {
     /// What only the exact strategy knows of must not be asked of another one.
@@ -208,7 +207,7 @@ impl SensorsSection {
         [
             pose.map(|n| Noise::from_sigmas(&[n.sigma_position_m, n.sigma_position_m, n.sigma_yaw_rad])),
             length(&self.relative_position, 2),
-            length(&self.range, 1),
+            self.range.as_ref().map(|noise| Noise::from_sigmas(&[noise.sigma_m])),
             angle(&self.bearing),
             self.range_bearing.as_ref().map(|n| Noise::from_sigmas(&[n.sigma_range_m, n.sigma_bearing_rad])),
             length(&self.gps, 2),
@@ -249,7 +248,7 @@ impl SensorsSection {
             ("relative_pose.sigma_position_m", pose.map(|noise| noise.sigma_position_m)),
             ("relative_pose.sigma_yaw_rad", pose.map(|noise| noise.sigma_yaw_rad)),
             ("relative_position.sigma_m", length(&self.relative_position)),
-            ("range.sigma_m", length(&self.range)),
+            ("range.sigma_m", self.range.as_ref().map(|noise| noise.sigma_m)),
             ("bearing.sigma_rad", angle(&self.bearing)),
             ("range_bearing.sigma_range_m", polar.map(|noise| noise.sigma_range_m)),
             ("range_bearing.sigma_bearing_rad", polar.map(|noise| noise.sigma_bearing_rad)),
@@ -259,6 +258,15 @@ impl SensorsSection {
         for (key, sigma) in sigmas {
             if let Some(sigma) = sigma {
                 positive(&format!("sensors.{key}"), sigma)?;
+            }
+        }
+        let growing = [
+            ("range.sigma_per_m", self.range.as_ref().map(|noise| noise.sigma_per_m)),
+            ("range_bearing.sigma_range_per_m", polar.map(|noise| noise.sigma_range_per_m)),
+        ];
+        for (key, sigma) in growing {
+            if let Some(sigma) = sigma {
+                not_negative(&format!("sensors.{key}"), sigma)?;
             }
         }
         Ok(())

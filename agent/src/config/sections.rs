@@ -8,6 +8,7 @@ use pleiad_estimation::joint::ErrorForm;
 use serde::{Deserialize, Serialize};
 
 use super::calibration::ClutterSection;
+use super::noises::{AngleNoise, LengthNoise, PoseNoise, RangeBearingNoise, RangeNoise};
 
 /// The error of a pose, as written in a configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -209,7 +210,7 @@ pub struct SensorsSection {
     pub relative_position: Option<LengthNoise>,
     /// Range alone.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub range: Option<LengthNoise>,
+    pub range: Option<RangeNoise>,
     /// Bearing alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bearing: Option<AngleNoise>,
@@ -235,42 +236,6 @@ pub enum UnknownLandmarks {
     Refuse,
     /// The team finds out their places.
     Map,
-}
-
-/// Noise of a pose.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PoseNoise {
-    /// Per axis, m.
-    pub sigma_position_m: f64,
-    /// Yaw, rad.
-    pub sigma_yaw_rad: f64,
-}
-
-/// Noise of a length or of each axis of a position.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LengthNoise {
-    /// m.
-    pub sigma_m: f64,
-}
-
-/// Noise of an angle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct AngleNoise {
-    /// rad.
-    pub sigma_rad: f64,
-}
-
-/// Noise of range and bearing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RangeBearingNoise {
-    /// m.
-    pub sigma_range_m: f64,
-    /// rad.
-    pub sigma_bearing_rad: f64,
 }
 
 /// `[clock]`: team time = local + offset + rate (local - reference).

@@ -1,6 +1,7 @@
 //! What can be asked of a node: its estimate, its settled history, its status.
 
 use pleiad_estimation::Timestamp;
+use pleiad_estimation::fact::NominalState;
 use pleiad_estimation::ledger::FactCounts;
 use pleiad_estimation::sample::SampleRefusal;
 use pleiad_estimation::symmetric::Symmetric3;
@@ -27,6 +28,13 @@ pub struct SettledEstimate {
 }
 
 impl Node {
+    /// The nominal trajectories of this robot's boots, as far as they are kept, tick by tick.
+    pub fn nominal_ticks(
+        &self,
+    ) -> impl Iterator<Item = (BootIndex, impl Iterator<Item = (Timestamp, NominalState)> + '_)> + '_ {
+        self.segments.iter().map(|segment| (segment.boot, segment.trajectory.ticks()))
+    }
+
     /// The estimate at the last odometry, on the facts held now; `None` while the robot has no place in
     /// the map.
     pub fn estimate(&mut self) -> Option<Estimate> {

@@ -20,6 +20,7 @@ mod simulate;
 mod slam;
 mod study;
 mod survey;
+mod tune;
 mod worlds;
 
 pub use runner::Survived;
@@ -32,6 +33,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Demo(args) => demo::run(&args),
         Command::Run(args) => run::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Tune(args) => tune::run(&args),
         Command::Observability(args) => observability::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),

@@ -93,6 +93,9 @@ fn of_recording(args: &SlamArgs, options: &RunOptions) -> anyhow::Result<SlamPag
                 "robot {robot} has no ground truth to start from, and the recording does not say where it started"
             );
         };
+        if let Some(key) = node.sensors.growing() {
+            bail!("{key}: slam knows ranges of one sigma only; take it out of the noise");
+        }
         let [_, relative_position, range, bearing, range_bearing, ..] = node.sensors.profiles();
         let samples = team.samples.get(robot).into_iter().flatten();
         // Each robot is alone here: what it sees of the others is left out.

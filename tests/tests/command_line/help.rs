@@ -2,10 +2,11 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 16] = [
+const COMMANDS: [&str; 17] = [
     "demo",
     "run",
     "replay",
+    "tune",
     "observability",
     "simulate",
     "diagnose",
