@@ -67,7 +67,7 @@ pub fn information(evaluate: &Evaluate, x: &[f64], value: f64) -> Information {
     let far: Vec<Vec<f64>> = (0..size).flat_map(|j| [moved(&[(j, -FAR)]), moved(&[(j, FAR)])]).collect();
     let bounded: Vec<[bool; 2]> = totals(&far)
         .chunks_exact(2)
-        .map(|sides| [0, 1].map(|side: usize| !(value - sides[side] < FALL)))
+        .map(|sides| [0, 1].map(|side: usize| value - sides[side] >= FALL || sides[side].is_nan()))
         .collect();
     let outer = outer_product(evaluate, x);
     // Steps over which the log-likelihood falls by about a half, so that rounding and roughness do not matter.

@@ -98,7 +98,7 @@ fn start<'a, K: Ord + std::fmt::Display + 'a>(
         let Some((_, first)) = values.next() else { continue };
         stated.push(level);
         start[level] = first;
-        if let Some((robot, other)) = values.find(|(_, other)| *other != first) {
+        if let Some((robot, other)) = values.find(|(_, other)| other.to_bits() != first.to_bits()) {
             notes.push(format!(
                 "{}: robot {robot} was told {other}, another one {first}: one level is sought for all, from {first}",
                 levels::key(level)

@@ -16,6 +16,9 @@ pub fn short(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
+/// What a row of the table says of a judgement.
+type Row = (&'static str, fn(&JudgedJson) -> String);
+
 pub fn text(json: &TuneJson) -> String {
     let mut text = format!(
         "{}: {} measurements, folded {} times in {:.0} s\n\n",
@@ -48,7 +51,7 @@ pub fn text(json: &TuneJson) -> String {
         short(json.outliers.share)
     );
     let _ = writeln!(text, "{:<42} {:>9} {:>9}", "", "start", "found");
-    let rows: [(&str, fn(&JudgedJson) -> String); 6] = [
+    let rows: [Row; 6] = [
         ("log-likelihood", |of| format!("{:.1}", of.log_likelihood)),
         ("NIS per degree of freedom, all", |of| format!("{:.2}", of.nis)),
         ("NIS per degree of freedom, used", |of| format!("{:.2}", of.nis_used)),
