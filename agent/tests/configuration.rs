@@ -220,12 +220,16 @@ fn what_is_required_is_missed_by_name() {
     let required = documented_keys().into_iter().filter(|(_, default)| default == "required");
     for (key, _) in required {
         let mut table = whole.clone();
-        let (outer, name) = key.split_once('.').unwrap_or(("", &key));
-        match table.get_mut(outer) {
-            Some(Value::Table(inner)) => inner.remove(name),
-            Some(Value::Array(list)) => list[0].as_table_mut().unwrap().remove(name),
-            _ => table.remove(name),
-        };
+        let (outer, name) = key.rsplit_once('.').unwrap_or(("", &key));
+        let mut inner = &mut table;
+        for step in outer.split('.').filter(|step| !step.is_empty()) {
+            inner = match inner.get_mut(step).unwrap() {
+                Value::Table(table) => table,
+                Value::Array(list) => list[0].as_table_mut().unwrap(),
+                other => panic!("{key}: {other}"),
+            };
+        }
+        inner.remove(name);
         let error = read(&table.to_string()).unwrap_err().to_string();
         assert!(error.contains(&format!("missing field `{name}`")), "{key}: {error}");
     }

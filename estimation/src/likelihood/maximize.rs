@@ -173,11 +173,15 @@ fn updated(inverse: &DMatrix<f64>, moved: &DVector<f64>, fallen: &DVector<f64>) 
 mod tests {
     use super::*;
 
-    /// `n` observations each of normal variables with standard deviations `exp(x_j)`.
+    /// Observations of normal variables with standard deviations `exp(x_j)`, whose squares have the means given and
+    /// are spread about them.
     fn normal(points: &[Vec<f64>], squares: &[f64], count: usize) -> Vec<Vec<f64>> {
+        let spread: Vec<f64> = (0..count).map(|k| -(1.0 - (k as f64 + 0.5) / count as f64).ln()).collect();
+        let mean = spread.iter().sum::<f64>() / count as f64;
         let one = |point: &Vec<f64>| {
-            let of = |j: usize| -point[j] - 0.5 * squares[j] * (-2.0 * point[j]).exp();
-            (0..count * squares.len()).map(|k| of(k % squares.len())).collect()
+            let of = |j: usize, share: f64| -point[j] - 0.5 * squares[j] * share * (-2.0 * point[j]).exp();
+            let all = spread.iter().flat_map(|share| (0..squares.len()).map(move |j| (j, share / mean)));
+            all.map(|(j, share)| of(j, share)).collect()
         };
         points.iter().map(one).collect()
     }

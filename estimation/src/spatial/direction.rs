@@ -64,7 +64,7 @@ mod tests {
 
     fn check(origin: Vector3, u: Vector3) {
         let [b1, b2] = tangent_basis(&origin);
-        assert!((b1.cross(&b2) - origin).norm() < 4e-16 && (b1.norm() - 1.0).abs() < 4e-16);
+        assert!((b1.cross(&b2) - origin).norm() < 2e-15 && (b1.norm() - 1.0).abs() < 2e-15);
         let (h, rows) = between_directions(&origin, &u).unwrap();
         // The way back: origin turned by the angle towards the tangent, in closed form.
         let along = b1 * h[0] + b2 * h[1];

@@ -141,7 +141,7 @@ fn what_is_wrong_with_position_fixes_is_said() {
 fn what_is_wrong_with_a_choice_of_landmarks_is_said() {
     for wrong in ["some", "6,x", "6;7", "-6"] {
         let choice = format!("--landmarks={wrong}");
-        refused(&["replay", "recording", &choice], &["--landmarks", wrong, "known, none, or numbers"]);
+        refused(&["replay", "recording", &choice], &["--landmarks", wrong, "known, none, team, or numbers"]);
     }
     refused(&["replay", "recording", "--landmarks", "6,99"], &["--landmarks", "99", "6, 7"]);
 }
