@@ -194,8 +194,8 @@ mod tests {
         let found = maximize(&evaluate, &[0.0, 0.0, 0.0], (&bounds.0, &bounds.1), 1e-3);
         assert!(found.converged, "{found:?}");
         for (x, square) in found.x.iter().zip(squares) {
-            // Differences over 0.04 leave an error of that squared over 6; the rest is the tolerance.
-            assert!((x - 0.5 * f64::ln(square)).abs() < 1e-3, "{found:?}");
+            // A step that promises 1e-3 where the curvature is 100 is one of 0.003; differences over 0.04 add a tenth of that.
+            assert!((x - 0.5 * f64::ln(square)).abs() < 4e-3, "{found:?}");
         }
     }
 
