@@ -51,7 +51,7 @@ fn together(config: FoldConfig) -> FoldConfig {
 /// Three sightings in ten are of nothing, and errors grow by less than a fifth. (Those that are left alone make up for
 /// more than half of that: the information of each sighting is worth a share.)
 #[test]
-fn a_third_of_garbage_costs_less_than_a_fifth() {
+fn three_tenths_of_garbage_cost_less_than_a_fifth() {
     let usual = World::default();
     let slippery = World { slip: 8.0, ..usual };
     let adrift = World { gps: false, slip: 4.0, every: 10, ..usual };

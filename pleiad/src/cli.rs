@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod evaluate;
+mod filter;
 mod slam;
 mod survey;
 mod tune;
@@ -16,6 +17,7 @@ use pleiad_sim_peers::scenario::ManoeuvreKind;
 
 pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
 pub use evaluate::{EvaluateArgs, VariantArg, VariantFilter};
+pub use filter::FilterArgs;
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
 pub use tune::{AlsoArg, TuneArgs};
@@ -109,27 +111,8 @@ pub struct RunArgs {
     /// Simulated seconds per second; as fast as the agents can if absent.
     #[arg(long)]
     pub speed: Option<f64>,
-    /// How the robots share what they see: exact, pairwise, intersection, split_intersection, naive or
-    /// independent (docs/strategies.md).
-    #[arg(long, default_value_t = StrategyKind::Exact)]
-    pub strategy: StrategyKind,
-    /// Coordinates of the filter's error.
-    #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
-    pub error: ErrorArg,
-    /// Linearize facts together: blocks of so many seconds, smoothed so far beyond, in so many passes, as in 5:5:4.
-    #[arg(long, value_name = "BLOCK_S:AHEAD_S:PASSES")]
-    pub relinearize: Option<RelinearizeArg>,
-    /// So large a share of observations is of nothing, seen up to so far away: each is weighed by its probability.
-    #[arg(long, value_name = "SHARE:REACH_M")]
-    pub clutter: Option<ClutterArg>,
-    /// What is not sure about the robots and is to be found out, by standard deviations: forward and yaw (scales of the odometry),
-    /// bias (yaw rate, rad/s), mount_m and mount_rad (the sensor of others), clock (s) and
-    /// drift_ppm (of all robots but the first).
-    #[arg(long, value_name = "NAME=SIGMA,...")]
-    pub calibrate: Option<CalibrateArg>,
-    /// Which robots are told where they start: all, none, or numbers as in 1,2. The others find out.
-    #[arg(long, default_value = "all")]
-    pub told: ToldArg,
+    #[command(flatten)]
+    pub filter: FilterArgs,
     /// A file of fault tables: what goes wrong between the robots and with their processes (docs/faults.md);
     /// those of the scenario itself if absent.
     #[arg(long, value_name = "FILE")]
@@ -150,27 +133,8 @@ pub struct ReplayArgs {
     /// A recording folder, a run folder, or an MRCLAM folder. The robots of a run start as they were told
     /// then (priors.toml), others where the ground truth says.
     pub recording: PathBuf,
-    /// How the robots share what they see: exact, pairwise, intersection, split_intersection, naive or
-    /// independent (docs/strategies.md).
-    #[arg(long, default_value_t = StrategyKind::Exact)]
-    pub strategy: StrategyKind,
-    /// Coordinates of the filter's error.
-    #[arg(long, value_enum, default_value_t = ErrorArg::Invariant)]
-    pub error: ErrorArg,
-    /// Linearize facts together: blocks of so many seconds, smoothed so far beyond, in so many passes, as in 5:5:4.
-    #[arg(long, value_name = "BLOCK_S:AHEAD_S:PASSES")]
-    pub relinearize: Option<RelinearizeArg>,
-    /// So large a share of observations is of nothing, seen up to so far away: each is weighed by its probability.
-    #[arg(long, value_name = "SHARE:REACH_M")]
-    pub clutter: Option<ClutterArg>,
-    /// What is not sure about the robots and is to be found out, by standard deviations: forward and yaw (scales of the odometry),
-    /// bias (yaw rate, rad/s), mount_m and mount_rad (the sensor of others), clock (s) and
-    /// drift_ppm (of all robots but the first).
-    #[arg(long, value_name = "NAME=SIGMA,...")]
-    pub calibrate: Option<CalibrateArg>,
-    /// Which robots are told where they start: all, none, or numbers as in 1,2. The others find out.
-    #[arg(long, default_value = "all")]
-    pub told: ToldArg,
+    #[command(flatten)]
+    pub filter: FilterArgs,
     /// Which landmarks the robots know: known, none, numbers as in 6,7, or team: none, and the team maps them.
     #[arg(long, default_value = "known")]
     pub landmarks: LandmarksArg,

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use pleiad_agent::config::{
-    AgentConfig, AngleNoise, BusSection, CalibrationSection, ClockSection, ErrorName, FilterSection,
-    LandmarkRow, LedgerSection, LengthNoise, MotionSection, OutputSection, PriorSection, RangeBearingNoise,
+    AgentConfig, AngleNoise, BusSection, CalibrationSection, ClockSection, FilterSection, LandmarkRow,
+    LedgerSection, LengthNoise, MotionSection, OutputSection, PriorSection, RangeBearingNoise,
     RobotCorrection, SensorsSection, UnknownLandmarks,
 };
 use pleiad_estimation::sample::{Reading, Sample};
@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 pub use beside::{MODEL, copy_model, write_beside};
 use beside::{model_for, priors_beside};
 
-use crate::cli::{AbsoluteArg, CalibrateArg, ClutterArg, ErrorArg, LandmarksArg, RelinearizeArg, ToldArg};
+use crate::cli::{AbsoluteArg, FilterArgs, LandmarksArg};
 
 /// Truth is interpolated across holes up to this long.
 pub const TRUTH_GAP_S: f64 = 0.3;
@@ -79,52 +79,6 @@ impl Team {
     pub fn span(&self) -> Option<(Timestamp, Timestamp)> {
         let times = self.samples.values().flatten().map(|sample| sample.time);
         times.clone().min().zip(times.max())
-    }
-}
-
-/// How the filter is to be run, from the command line.
-#[derive(Clone, Debug)]
-pub struct FilterArgs {
-    pub strategy: StrategyKind,
-    pub error: ErrorArg,
-    pub relinearize: Option<RelinearizeArg>,
-    pub clutter: Option<ClutterArg>,
-    pub calibrate: Option<CalibrateArg>,
-    /// Who is told where it starts.
-    pub told: ToldArg,
-}
-
-impl FilterArgs {
-    /// The exact strategy as it comes.
-    pub fn exact(error: ErrorArg) -> Self {
-        Self {
-            strategy: StrategyKind::Exact,
-            error,
-            relinearize: None,
-            clutter: None,
-            calibrate: None,
-            told: ToldArg::All,
-        }
-    }
-}
-
-impl FilterArgs {
-    fn tells(&self, robot: RobotId) -> bool {
-        match &self.told {
-            ToldArg::All => true,
-            ToldArg::Only(robots) => robots.contains(&robot),
-        }
-    }
-
-    fn apply(&self, filter: &FilterSection) -> FilterSection {
-        let error = match self.error {
-            ErrorArg::Invariant => ErrorName::Invariant,
-            ErrorArg::Additive => ErrorName::Additive,
-        };
-        let relinearize = self.relinearize.map(|how| how.0).or(filter.relinearize);
-        let clutter = self.clutter.map(|clutter| clutter.0).or(filter.clutter);
-        let join = filter.join || self.told != ToldArg::All;
-        FilterSection { error, gate: filter.gate, clutter, join, relinearize }
     }
 }
 

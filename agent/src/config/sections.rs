@@ -29,11 +29,11 @@ pub struct FilterSection {
     pub error: ErrorName,
     /// Gate on the normalized innovation squared for measurements of dimension 1, 2, 3.
     pub gate: [f64; 3],
+    /// Robots without a prior find out where they are from what is seen.
+    pub join: bool,
     /// Some observations are of nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clutter: Option<ClutterSection>,
-    /// Robots without a prior find out where they are from what is seen.
-    pub join: bool,
     /// Facts are linearized together, not each where those before it put the robots.
     pub relinearize: Option<RelinearizeSection>,
 }

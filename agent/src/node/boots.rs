@@ -76,7 +76,9 @@ impl Node {
             let quantity = Quantity::Absolute(Absolute::Pose(prior.pose));
             let noise = NoiseRef::Explicit(prior.noise);
             self.say(index, Body::Observation(Observation { time, quantity, noise, observer }));
-        } else if continuation.is_none() && !self.config.fold.join {
+        } else if continuation.is_none() && self.config.fold.join {
+            self.notice(Notice::Searching { boot: index });
+        } else if continuation.is_none() {
             self.notice(Notice::NoPrior { boot: index });
         }
     }

@@ -220,4 +220,13 @@ pub enum Notice {
         /// The boot.
         boot: BootIndex,
     },
+    /// The robot has no place in the map yet, and finds out.
+    #[error(
+        "boot {boot} begins without a prior: the robot has a place in the map, and publishes estimates, once what is seen \
+         tells where it is"
+    )]
+    Searching {
+        /// The boot.
+        boot: BootIndex,
+    },
 }

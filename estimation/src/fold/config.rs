@@ -39,6 +39,11 @@ pub struct Clutter {
 impl Clutter {
     /// Logarithm of the odds of an observation's being of nothing, by the density of its readings.
     pub(super) fn log_odds(&self, quantity: &Quantity) -> f64 {
+        libm::log(self.share / (1.0 - self.share)) - self.log_volume(quantity)
+    }
+
+    /// Logarithm of the volume of the readings that a sensor can give.
+    pub(crate) fn log_volume(&self, quantity: &Quantity) -> f64 {
         let disc = std::f64::consts::PI * self.reach_m * self.reach_m;
         let turn = std::f64::consts::TAU;
         let volume = match quantity {
@@ -55,7 +60,7 @@ impl Clutter {
             Quantity::Absolute(Absolute::Position(_)) => disc,
             Quantity::Absolute(Absolute::Heading(_)) => turn,
         };
-        libm::log(self.share / (1.0 - self.share)) - libm::log(volume)
+        libm::log(volume)
     }
 }
 

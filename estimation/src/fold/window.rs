@@ -10,7 +10,8 @@
 //! linearized.
 
 use crate::fold::{
-    Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, Taken, across, fold, linearize, taken,
+    DEFAULT_GATE, Fact, FactKey, FoldConfig, Outcome, Residual, SkipReason, Taken, across, fold, linearize,
+    taken,
 };
 use crate::geometry::{Matrix3, Vector3};
 use crate::joint::{Block, ErrorForm, Joint, Participant, Prepared};
@@ -371,6 +372,8 @@ impl Pass {
 /// McClure (`geman1987`), which hardly grows beyond the gate.
 fn weight(linearized: &Linearization, noise: &Matrix3, threshold: f64) -> f64 {
     let square = crate::joint::squared(linearized.dimension, &linearized.innovation, noise);
+    // An open gate says nothing of what does not fit.
+    let threshold = if threshold.is_finite() { threshold } else { DEFAULT_GATE[linearized.dimension - 1] };
     let share = threshold / (threshold + square);
     (share * share).max(LEAST_WEIGHT)
 }

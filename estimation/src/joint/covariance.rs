@@ -4,6 +4,7 @@
 //! could reorder: the same numbers come out of every processor.
 
 use super::Participant;
+use crate::geometry::ordered::{cholesky, forward};
 use crate::geometry::{Matrix3, Vector3};
 use crate::symmetric::Symmetric3;
 
@@ -308,14 +309,7 @@ impl JointCovariance {
                 *entry /= pivot;
             }
         }
-        let mut whitened = Vector3::zeros();
-        for row in 0..dimension {
-            let mut sum = innovation[row];
-            for k in 0..row {
-                sum -= l[(row, k)] * whitened[k];
-            }
-            whitened[row] = sum / l[(row, row)];
-        }
+        let whitened = forward(dimension, &l, innovation);
         Some(Prepared { dimension, columns, whitened, factor: l })
     }
 
@@ -364,37 +358,10 @@ impl JointCovariance {
 /// `r^T S^-1 r` of the leading `dimension` rows; infinite if `S`, given by its lower triangle, is not positive definite.
 pub(crate) fn squared(dimension: usize, r: &Vector3, s: &Matrix3) -> f64 {
     let Some(l) = cholesky(dimension, s) else { return f64::INFINITY };
-    let mut whitened = Vector3::zeros();
+    let whitened = forward(dimension, &l, r);
     let mut square = 0.0;
-    for row in 0..dimension {
-        let mut sum = r[row];
-        for k in 0..row {
-            sum -= l[(row, k)] * whitened[k];
-        }
-        whitened[row] = sum / l[(row, row)];
-        square += whitened[row] * whitened[row];
+    for k in 0..dimension {
+        square += whitened[k] * whitened[k];
     }
     square
-}
-
-/// Lower Cholesky factor of the leading `dimension` rows of a symmetric matrix given by its lower triangle.
-fn cholesky(dimension: usize, s: &Matrix3) -> Option<Matrix3> {
-    let mut l = Matrix3::zeros();
-    for row in 0..dimension {
-        for column in 0..=row {
-            let mut sum = s[(row, column)];
-            for k in 0..column {
-                sum -= l[(row, k)] * l[(column, k)];
-            }
-            if row == column {
-                if !(sum > 0.0 && sum.is_finite()) {
-                    return None;
-                }
-                l[(row, row)] = sum.sqrt();
-            } else {
-                l[(row, column)] = sum / l[(column, column)];
-            }
-        }
-    }
-    Some(l)
 }

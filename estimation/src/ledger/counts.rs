@@ -55,9 +55,10 @@ impl FactCounts {
             }
         }
         match record.residual.map(|residual| residual.outcome) {
-            Some(Outcome::Used | Outcome::Tied | Outcome::Joined { .. }) => self.used += 1,
+            Some(Outcome::Used | Outcome::Joined { .. }) => self.used += 1,
             Some(Outcome::Rejected { .. }) => self.rejected += 1,
-            Some(Outcome::Skipped(_)) => self.skipped += 1,
+            // Of what waits between two frames some is used when they join.
+            Some(Outcome::Skipped(_) | Outcome::Tied) => self.skipped += 1,
             Some(Outcome::Booted | Outcome::Placed) | None => {}
         }
     }

@@ -1,12 +1,11 @@
 //! The density of each measurement under what the fold predicts of it.
 
 use super::{Levels, TunableFact};
-use crate::fact::{Absolute, NominalState, Quantity};
-use crate::fold::{Clutter, Fact, FactKey, FoldConfig, Outcome, fold};
+use crate::fact::{NominalState, Quantity};
+use crate::fold::{Fact, FactKey, FoldConfig, Outcome, fold};
 use crate::geometry::{Matrix3, Vector2};
 use crate::joint::{Block, Joint};
 use crate::measurement::{self, Linearization};
-use crate::sample::Relative;
 use crate::{BootIndex, Pose2, RobotId};
 
 /// What a measurement says of the noise levels.
@@ -57,7 +56,7 @@ fn score(joint: &mut Joint, config: &FoldConfig, key: &FactKey, fact: &Fact) -> 
         None => (log_normal, 1.0),
         Some(clutter) => {
             let normal = libm::log(1.0 - clutter.share) + log_normal;
-            let nothing = libm::log(clutter.share) - log_volume(clutter, quantity);
+            let nothing = libm::log(clutter.share) - clutter.log_volume(quantity);
             let (more, less) = if normal > nothing { (normal, nothing) } else { (nothing, normal) };
             let together = more + libm::log1p(libm::exp(less - more));
             (together, libm::exp(normal - together))
@@ -154,24 +153,4 @@ fn normal(dimension: usize, covariance: &Matrix3, at: &Linearization) -> Option<
     }
     let log_two_pi = libm::log(std::f64::consts::TAU);
     Some((nis, -0.5 * nis - half_log_determinant - 0.5 * dimension as f64 * log_two_pi))
-}
-
-/// Logarithm of the volume of the readings that a sensor can give, as the fold takes it for clutter.
-fn log_volume(clutter: &Clutter, quantity: &Quantity) -> f64 {
-    let disc = std::f64::consts::PI * clutter.reach_m * clutter.reach_m;
-    let turn = std::f64::consts::TAU;
-    libm::log(match quantity {
-        Quantity::Robot { relative, .. }
-        | Quantity::Landmark { relative, .. }
-        | Quantity::Feature { relative, .. } => match relative {
-            Relative::Pose(_) => disc * turn,
-            Relative::Position { .. } => disc,
-            Relative::Range { .. } => clutter.reach_m,
-            Relative::Bearing { .. } => turn,
-            Relative::RangeBearing { .. } => clutter.reach_m * turn,
-        },
-        Quantity::Absolute(Absolute::Pose(_)) => disc * turn,
-        Quantity::Absolute(Absolute::Position(_)) => disc,
-        Quantity::Absolute(Absolute::Heading(_)) => turn,
-    })
 }

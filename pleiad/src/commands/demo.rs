@@ -13,9 +13,9 @@ use serde::Serialize;
 use super::observability::of_run;
 use super::replay::{command_line, write_run};
 use super::runner::{self, Feeder, ProcessOptions};
-use crate::cli::{DemoArgs, ErrorArg};
+use crate::cli::{DemoArgs, ErrorArg, FilterArgs};
 use crate::evaluation::{self, RunResult};
-use crate::setup::{self, FilterArgs, Team};
+use crate::setup::{self, Team};
 use crate::{folder, output};
 
 /// The two cases: name, and the scenario they start from.

@@ -10,10 +10,10 @@ use pleiad_sim_peers::{Scenario, connectivity, simulate};
 use serde::Serialize;
 
 use super::runner;
-use crate::cli::{ErrorArg, LandmarksArg, ObservabilityArgs};
+use crate::cli::{ErrorArg, FilterArgs, LandmarksArg, ObservabilityArgs};
 use crate::evaluation::RunResult;
 use crate::output;
-use crate::setup::{self, FilterArgs, ReplayOptions, Team};
+use crate::setup::{self, ReplayOptions, Team};
 
 /// Window within which a sighting links two robots, seconds.
 const CONNECTIVITY_WINDOW_S: f64 = 10.0;

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::runner::{self, Feeder, ProcessOptions, Survived};
 use crate::cli::ReplayArgs;
 use crate::evaluation::{self, NisJson, RunResult};
-use crate::setup::{self, FilterArgs, ReplayOptions, Team};
+use crate::setup::{self, ReplayOptions, Team};
 use crate::{output, payload};
 
 /// `replay --json` and `summary.json`.
@@ -91,14 +91,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let (recording, ingest) =
         pleiad_recording::open(&folder, &ReadOptions { skip_bad_rows: args.skip_bad_rows })?;
     let options = ReplayOptions {
-        filter: FilterArgs {
-            strategy: args.strategy,
-            error: args.error,
-            relinearize: args.relinearize,
-            clutter: args.clutter,
-            calibrate: args.calibrate,
-            told: args.told.clone(),
-        },
+        filter: args.filter.clone(),
         landmarks: &args.landmarks,
         absolute: &args.absolute,
         start_s: args.start,

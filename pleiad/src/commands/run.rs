@@ -11,7 +11,7 @@ use pleiad_sim_peers::{Scenario, simulate};
 use super::replay::{command_line, text, write_run};
 use super::runner::{self, Faults, Feeder, ProcessOptions};
 use crate::cli::RunArgs;
-use crate::setup::{self, FilterArgs, Team};
+use crate::setup::{self, Team};
 use crate::{folder, output};
 
 pub fn run(args: &RunArgs) -> anyhow::Result<()> {
@@ -21,15 +21,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     let scenario = Scenario::load(&args.scenario)?;
     let seed = args.seed.unwrap_or(scenario.seed);
     let world = simulate(&scenario, seed)?;
-    let filter = FilterArgs {
-        strategy: args.strategy,
-        error: args.error,
-        relinearize: args.relinearize,
-        clutter: args.clutter,
-        calibrate: args.calibrate,
-        told: args.told.clone(),
-    };
-    let team = setup::simulated(&scenario, world, &filter);
+    let team = setup::simulated(&scenario, world, &args.filter);
     let file = args.faults.as_ref().or_else(|| (!scenario.faults.rules.is_empty()).then_some(&args.scenario));
     let faults = file.map(|file| faults(file, &team, seed)).transpose()?;
     let out = folder::create(args.out.as_deref(), &scenario.name)?;

@@ -14,8 +14,8 @@ use pleiad_sim_peers::Scenario;
 use pleiad_survey::slam::{Asked, RunOptions, SlamInput, SlamPage, on_recording, on_scenario};
 
 use super::{replay, study};
-use crate::cli::{AssociationArg, ErrorArg, LandmarksArg, MeasureArg, SlamArgs};
-use crate::setup::{self, FilterArgs, ReplayOptions};
+use crate::cli::{AssociationArg, ErrorArg, FilterArgs, LandmarksArg, MeasureArg, SlamArgs};
+use crate::setup::{self, ReplayOptions};
 use crate::{folder, output};
 
 pub fn run(args: &SlamArgs) -> anyhow::Result<()> {

@@ -4,6 +4,7 @@ pub mod check;
 pub mod control;
 mod entry;
 mod estimate;
+mod joint;
 pub mod membership;
 pub mod sample;
 pub mod snapshot;

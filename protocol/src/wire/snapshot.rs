@@ -1,20 +1,14 @@
 //! Snapshots: the request, the parts it is sent in, and its bytes.
 
 use pleiad_estimation::fact::{ClockMap, Entry, EntryId, Fingerprint, LogId, Noise, Seal, Vote};
-use pleiad_estimation::geometry::Matrix3;
-use pleiad_estimation::joint::{
-    Anchor, Block, Component, End, ErrorForm, Joint, JointParts, MappedLandmark, Measured, Member,
-    ParameterKind, Parameters, Tie,
-};
+use pleiad_estimation::joint::{ErrorForm, Joint, JointParts, Tie};
 use pleiad_estimation::ledger::{Checkpoint, FactCounts, LogBase, Term, Views};
-use pleiad_estimation::symmetric::Symmetric3;
-use pleiad_estimation::{BootIndex, LandmarkId, RobotId, Timestamp};
+use pleiad_estimation::{BootIndex, RobotId, Timestamp};
 use serde::{Deserialize, Serialize};
 
-use super::check::{self, WirePose, WireSymmetric};
 use super::entry::{WireEntry, WireId, WireLog, WireNoise};
+use super::joint::{WireBlock, WireNumber, WireTie, wire_block, wire_tie};
 use super::membership::{WireSeal, WireVote};
-use super::sample::WireRelative;
 use crate::codec::{self, Reader};
 use crate::error::ProtocolError;
 use crate::limits;
@@ -73,55 +67,6 @@ struct WireHead {
 }
 
 #[derive(Serialize, Deserialize)]
-struct WireMember {
-    robot: u32,
-    boot: u32,
-    correction: WirePose,
-    nominal: WirePose,
-    folded_noise: WireSymmetric,
-    /// By columns; none if nothing was ever folded.
-    folded_motion: Option<[f64; 9]>,
-    component: WireComponent,
-    placed: bool,
-}
-
-/// Who began a frame, and when; none is the map.
-type WireComponent = Option<(i64, u32)>;
-
-#[derive(Serialize, Deserialize)]
-enum WireEnd {
-    Map,
-    Point([f64; 2]),
-    Anchor(u32),
-}
-
-#[derive(Serialize, Deserialize)]
-struct WireTie {
-    time_ns: i64,
-    ends: [WireEnd; 2],
-    /// None is a heading.
-    relative: Option<WireRelative>,
-    heading: f64,
-    noise: WireSymmetric,
-}
-
-#[derive(Serialize, Deserialize)]
-enum WireBlock {
-    Robot(WireMember),
-    Parameters { robot: u32, kind: WireParameters, value: [f64; 3], since_ns: i64 },
-    Landmark(u32, WirePose, WireComponent),
-    Anchor(WirePose, WireComponent),
-    Free,
-}
-
-#[derive(Clone, Copy, Serialize, Deserialize)]
-enum WireParameters {
-    Motion,
-    Mount,
-    Clock,
-}
-
-#[derive(Serialize, Deserialize)]
 struct WireLogBase(WireLog, u64, [u8; 16], Option<u64>);
 
 #[derive(Serialize, Deserialize)]
@@ -146,158 +91,6 @@ struct WireTerm {
     boot: u32,
     until_ns: Option<i64>,
     limits: Vec<(WireLog, u64)>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct WireNumber(f64);
-
-impl TryFrom<WireNumber> for f64 {
-    type Error = ProtocolError;
-
-    fn try_from(WireNumber(found): WireNumber) -> Result<Self, ProtocolError> {
-        check::number("covariance", found)
-    }
-}
-
-impl TryFrom<WireMember> for (Member, bool) {
-    type Error = ProtocolError;
-
-    fn try_from(wire: WireMember) -> Result<Self, ProtocolError> {
-        let correction = check::pose("correction", wire.correction)?;
-        let nominal = check::pose("nominal", wire.nominal)?;
-        for entry in wire.folded_noise {
-            check::number("folded_noise", entry)?;
-        }
-        let (robot, boot) = (RobotId(wire.robot), BootIndex(wire.boot));
-        let mut member = Member::new(robot, boot, correction, nominal, Symmetric3(wire.folded_noise));
-        if let Some(columns) = wire.folded_motion {
-            for entry in columns {
-                check::number("folded_motion", entry)?;
-            }
-            member.folded_motion = Matrix3::from_column_slice(&columns);
-        }
-        member.component = component(wire.component);
-        Ok((member, wire.placed))
-    }
-}
-
-impl TryFrom<WireBlock> for (Block, bool) {
-    type Error = ProtocolError;
-
-    fn try_from(wire: WireBlock) -> Result<Self, ProtocolError> {
-        Ok(match wire {
-            WireBlock::Robot(member) => {
-                let (member, placed) = member.try_into()?;
-                (Block::Robot(member), placed)
-            }
-            WireBlock::Parameters { robot, kind, value, since_ns } => {
-                for entry in value {
-                    check::number("parameter", entry)?;
-                }
-                let kind = match kind {
-                    WireParameters::Motion => ParameterKind::Motion,
-                    WireParameters::Mount => ParameterKind::Mount,
-                    WireParameters::Clock => ParameterKind::Clock,
-                };
-                let (robot, since) = (RobotId(robot), Timestamp(since_ns));
-                (Block::Parameters(Parameters { robot, kind, value: value.into(), since }), false)
-            }
-            WireBlock::Landmark(landmark, pose, of) => {
-                let (pose, component) = (check::pose("landmark", pose)?, component(of));
-                (Block::Landmark(MappedLandmark { landmark: LandmarkId(landmark), pose, component }), false)
-            }
-            WireBlock::Anchor(pose, of) => {
-                let (pose, component) = (check::pose("anchor", pose)?, component(of));
-                (Block::Anchor(Anchor { pose, component }), false)
-            }
-            WireBlock::Free => (Block::Free, false),
-        })
-    }
-}
-
-fn component(wire: WireComponent) -> Component {
-    wire.map_or(Component::MAP, |(since_ns, robot)| Component::new(Timestamp(since_ns), RobotId(robot)))
-}
-
-fn wire_component(component: Component) -> WireComponent {
-    let (since, robot) = component.origin();
-    (component != Component::MAP).then_some((since.0, robot.0))
-}
-
-impl TryFrom<WireTie> for Tie {
-    type Error = ProtocolError;
-
-    fn try_from(wire: WireTie) -> Result<Self, ProtocolError> {
-        let end = |end: WireEnd| {
-            Ok(match end {
-                WireEnd::Map => End::Map,
-                WireEnd::Point(place) => End::Point(check::pair("tie.place", place)?),
-                WireEnd::Anchor(index) => End::Anchor(index as usize),
-            })
-        };
-        let [one, other] = wire.ends;
-        let measured = match wire.relative {
-            Some(relative) => Measured::Relative(relative.try_into()?),
-            None => Measured::Heading(check::number("tie.heading", wire.heading)?),
-        };
-        for entry in wire.noise {
-            check::number("tie.noise", entry)?;
-        }
-        let ends = [end(one)?, end(other)?];
-        Ok(Self { time: Timestamp(wire.time_ns), ends, measured, noise: Symmetric3(wire.noise) })
-    }
-}
-
-fn wire_tie(tie: &Tie) -> WireTie {
-    let end = |end: &End| match end {
-        End::Map => WireEnd::Map,
-        End::Point(place) => WireEnd::Point(*place),
-        #[allow(clippy::cast_possible_truncation, reason = "a team has fewer blocks")]
-        End::Anchor(index) => WireEnd::Anchor(*index as u32),
-    };
-    let (relative, heading) = match &tie.measured {
-        Measured::Relative(relative) => (Some(relative.into()), 0.0),
-        Measured::Heading(heading) => (None, *heading),
-    };
-    WireTie { time_ns: tie.time.0, ends: tie.ends.each_ref().map(end), relative, heading, noise: tie.noise.0 }
-}
-
-fn wire_block(block: &Block, placed: bool) -> WireBlock {
-    match block {
-        Block::Robot(member) => {
-            let motion = member.folded_motion;
-            WireBlock::Robot(WireMember {
-                robot: member.robot.0,
-                boot: member.boot.0,
-                correction: check::wire_pose(&member.correction),
-                nominal: check::wire_pose(&member.nominal),
-                folded_noise: member.folded_noise.0,
-                folded_motion: (motion != Matrix3::zeros())
-                    .then(|| std::array::from_fn(|entry| motion[entry])),
-                component: wire_component(member.component),
-                placed,
-            })
-        }
-        Block::Parameters(of) => WireBlock::Parameters {
-            robot: of.robot.0,
-            kind: match of.kind {
-                ParameterKind::Motion => WireParameters::Motion,
-                ParameterKind::Mount => WireParameters::Mount,
-                ParameterKind::Clock => WireParameters::Clock,
-            },
-            value: of.value.into(),
-            since_ns: of.since.0,
-        },
-        Block::Landmark(mapped) => WireBlock::Landmark(
-            mapped.landmark.0,
-            check::wire_pose(&mapped.pose),
-            wire_component(mapped.component),
-        ),
-        Block::Anchor(anchor) => {
-            WireBlock::Anchor(check::wire_pose(&anchor.pose), wire_component(anchor.component))
-        }
-        Block::Free => WireBlock::Free,
-    }
 }
 
 impl TryFrom<WireLogBase> for (LogId, LogBase) {

@@ -15,11 +15,11 @@ use pleiad_report::write_summary;
 use pleiad_sim_peers::{Scenario, simulate};
 use serde::Serialize;
 
-use crate::cli::{ErrorArg, EvaluateArgs, VariantArg, VariantFilter};
+use crate::cli::{ErrorArg, EvaluateArgs, FilterArgs, VariantArg, VariantFilter};
 use crate::commands::replay::command_line;
 use crate::commands::worlds::{Truth, World};
 use crate::output;
-use crate::setup::{self, FilterArgs};
+use crate::setup;
 use rows::Row;
 use trial::Trial;
 

@@ -16,11 +16,11 @@ use pleiad_report::write_summary;
 use pleiad_sim_peers::{Scenario, simulate};
 use serde::Serialize;
 
-use crate::cli::{ErrorArg, FaultsArgs, LandmarksArg};
+use crate::cli::{ErrorArg, FaultsArgs, FilterArgs, LandmarksArg};
 use crate::commands::replay::command_line;
 use crate::commands::worlds::{Truth, World};
 use crate::output;
-use crate::setup::{self, FilterArgs, ReplayOptions};
+use crate::setup::{self, ReplayOptions};
 use levels::Level;
 use rows::Row;
 use run::{RunScore, Window};

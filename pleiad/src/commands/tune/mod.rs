@@ -11,8 +11,8 @@ use anyhow::bail;
 use pleiad_estimation::likelihood::{Level, largest_reading_m};
 use pleiad_recording::ReadOptions;
 
-use crate::cli::{AlsoArg, ErrorArg, TuneArgs};
-use crate::setup::{self, FilterArgs, ReplayOptions};
+use crate::cli::{AlsoArg, ErrorArg, FilterArgs, TuneArgs};
+use crate::setup::{self, ReplayOptions};
 use crate::{levels, output};
 
 /// What a level begins with that is asked for and zero.
