@@ -12,6 +12,8 @@ mod demo;
 mod errors;
 #[path = "command_line/evaluate.rs"]
 mod evaluate;
+#[path = "command_line/found.rs"]
+mod found;
 #[path = "command_line/help.rs"]
 mod help;
 #[path = "command_line/json.rs"]
