@@ -328,7 +328,7 @@ pub struct LedgerSection {
     /// A robot from which nothing was heard for longer is evicted by the majority of the others, s;
     /// without it only an operator evicts.
     pub evict_after_s: Option<f64>,
-    /// With so many items in memory (entries, facts, answers; 0.3 kB each) the robot observes nothing more until
+    /// With so many items in memory (entries, facts, answers; 0.5 kB each) the robot observes nothing more until
     /// some are closed.
     pub most_items: usize,
     /// The nominal trajectory begins anew that far from its origin, m.
