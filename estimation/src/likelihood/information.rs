@@ -36,6 +36,12 @@ impl Range {
             && self.falls.iter().all(|fall| *fall > 0.25 * FALL)
     }
 
+    /// Whether the log-likelihood falls at the ends of the interval by no more than four times what a parabola would. Where it
+    /// falls further it is rough: readings that are taken or left as a whole, with all that follows from it. Such an interval is too narrow.
+    pub fn is_smooth(&self) -> bool {
+        self.falls.iter().all(|fall| *fall < 4.0 * FALL)
+    }
+
     /// The 95 % interval about `x`.
     pub fn interval(&self, x: f64) -> Option<[f64; 2]> {
         self.standard_error.map(|error| [x - QUANTILE * error, x + QUANTILE * error])
@@ -187,5 +193,20 @@ mod tests {
         assert!((known.robust_error.unwrap() / expected - 1.0).abs() < 5e-3, "{known:?}");
         assert!(known.falls.iter().all(|fall| (fall / FALL - 1.0).abs() < 0.1), "{known:?}");
         assert!(!unknown.is_determined() && unknown.bounded == [false; 2]);
+        assert!(known.is_smooth());
+    }
+
+    #[test]
+    fn a_maximum_on_a_ledge_is_said_to_be_rough() {
+        // A parabola with a standard error of 0.05, and a cliff of 30 at 0.08.
+        let evaluate = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            let ledge = |x: f64| if x.abs() > 0.08 { -30.0 } else { 0.0 };
+            points.iter().map(|x| vec![-200.0 * x[0] * x[0] + ledge(x[0])]).collect()
+        };
+        let clean = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            points.iter().map(|x| vec![-200.0 * x[0] * x[0]]).collect()
+        };
+        assert!(information(&clean, &[0.0], 0.0).ranges[0].is_smooth());
+        assert!(!information(&evaluate, &[0.0], 0.0).ranges[0].is_smooth());
     }
 }

@@ -35,14 +35,11 @@ pub struct TuneArgs {
     /// keys as in motion.yaw_rad_per_sqrt_rad,sensors.range_bearing.sigma_range_per_m.
     #[arg(long, default_value = "auto")]
     pub also: AlsoArg,
-    /// Write the share of outliers found as [filter.clutter], so that a replay weighs measurements by it.
-    #[arg(long)]
-    pub clutter: bool,
     /// Leave out rows that cannot be read; they are counted and reported.
     #[arg(long)]
     pub skip_bad_rows: bool,
-    /// File for the noise found, which `replay --noise` and agents read; of robots whose geometry differs, a file for
-    /// each: NAME-rN.toml for robot N. Printed in any case.
+    /// File for the noise found, which `replay --noise` and agents read, with [filter.clutter] if there was garbage; of
+    /// robots whose geometry differs, a file for each: NAME-rN.toml for robot N. Printed in any case.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// One JSON object on stdout.

@@ -115,6 +115,9 @@ fn who_is_told_the_truth_is_told_it_again_and_nothing_is_added() {
     assert!(list(&found, "tried").iter().all(|tried| tried["kept"] == false), "{found}");
     assert!(number(&found["outliers"], "share") < 2e-3, "{found}");
     assert!(found["maximum"] == true, "{found}");
+    assert!(found["outliers"]["found"] == false, "{found}");
+    let written = std::fs::read_to_string(folder.path().join("found.toml")).unwrap();
+    assert!(!written.contains("clutter"), "{written}");
     // The file is one that a replay takes.
     let words = ["replay", "recording", "--noise", "found.toml", "--json", "--out", "out"];
     let replay = run(folder.path(), words).json();
@@ -136,7 +139,7 @@ fn one_sighting_in_twenty_of_nothing_does_not_move_the_levels() {
             }
         });
         told(folder.path(), WRONG);
-        let found = tune(folder.path(), &["--also", "none", "--clutter", "--out", "found.toml"]);
+        let found = tune(folder.path(), &["--also", "none", "--out", "found.toml"]);
         held += inside(&found);
         // Of all measurements, fixes and headings with them; 5 % of the sightings.
         let share = number(&found["outliers"], "share");
@@ -193,9 +196,13 @@ fn what_cannot_be_tuned_is_refused_with_what_to_do() {
     let noise = std::fs::read_to_string(folder.path().join("noise.toml")).unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("blind.toml", noise.split("[sensors]").next().unwrap());
+    write("additive.toml", &format!("[filter]\nerror = \"additive\"\n{noise}"));
+    write("joining.toml", &format!("[filter]\njoin = true\n{noise}"));
     write("calibrated.toml", &format!("{noise}[calibration]\nsigma_forward_scale = 0.01\n"));
     for (arguments, words) in [
         (&["--noise", "blind.toml"][..], &["no observation", "pleiad replay"][..]),
+        (&["--noise", "additive.toml"], &["filter.error", "invariant"]),
+        (&["--noise", "joining.toml"], &["filter.join", "take it out"]),
         (&["--noise", "calibrated.toml"], &["[calibration]", "take the table out"]),
         (&["--noise", "noise.toml", "--also", "sensors.bearing.sigma_rad"], &["sensors.bearing.sigma_rad"]),
         (

@@ -34,6 +34,12 @@ pub fn gather(team: &Team) -> anyhow::Result<Gathered> {
                  maximized; take it out of the noise, and put it back into what is found"
             );
         }
+        if agent.filter.join {
+            bail!(
+                "filter.join = true (robot {robot}): how many sightings it takes to join frames depends on the noise, so that \
+                 likelihoods would be of different readings; take it out of the noise, and put it back into what is found"
+            );
+        }
         if agent.calibration.is_some() {
             bail!(
                 "[calibration] (robot {robot}): noise levels are found with parameters known; take the table out of \

@@ -68,7 +68,7 @@ pub fn run(args: &TuneArgs) -> anyhow::Result<()> {
     let said = |what: String| spinner.set_message(format!("{}: {what}", recording.name));
     let found = search::search(&gathered.facts, start, (free, candidates), reach_m, &said);
     spinner.finish_and_clear();
-    let json = result::judged(&recording.name, &team, &gathered, found, reach_m, began, args)?;
+    let json = result::judged(&recording.name, &team, &gathered, found, reach_m, began)?;
     if let Some(out) = &args.out {
         result::write(out, &json)?;
     }

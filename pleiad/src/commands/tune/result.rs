@@ -14,7 +14,6 @@ use serde::Serialize;
 
 use super::gather::Gathered;
 use super::search::{self, Found};
-use crate::cli::TuneArgs;
 use crate::commands::replay::command_line;
 use crate::levels;
 use crate::setup::{NoiseFile, Team};
@@ -55,6 +54,8 @@ pub struct LevelJson {
     pub robust_error: Option<f64>,
     pub falls: [f64; 2],
     pub determined: bool,
+    /// Whether the log-likelihood is like a parabola as far as the interval goes; an interval on a rough one is too narrow.
+    pub smooth: bool,
     /// Largest value that is as good as the best, of a level that the data only bound from above.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_most: Option<f64>,
@@ -65,6 +66,10 @@ pub struct OutliersJson {
     pub share: f64,
     pub interval_95: Option<[f64; 2]>,
     pub reach_m: f64,
+    /// By how much more likely the recording is with this share than with next to none.
+    pub gain: f64,
+    /// Whether that is enough for [filter.clutter] to be written (BIC).
+    pub found: bool,
 }
 
 /// How well levels describe the recording.
@@ -80,6 +85,12 @@ pub struct JudgedJson {
     pub rejected: usize,
     /// Share of the sum of NIS that is of refused measurements.
     pub nis_share_rejected: f64,
+    /// By the fold that is maximized, each measurement weighed by its probability of being of something.
+    pub nis_weighed: f64,
+    /// How many are of nothing then: the sum of their probabilities.
+    pub of_nothing: f64,
+    /// Share of the sum of NIS that they have.
+    pub nis_share_of_nothing: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -105,7 +116,6 @@ pub fn judged(
     found: Found,
     reach_m: f64,
     began: Instant,
-    args: &TuneArgs,
 ) -> anyhow::Result<TuneJson> {
     let Found { problem, maximum, information, starts, tried, evaluations } = found;
     let (mut tuned, share) = problem.at(&maximum.x);
@@ -120,6 +130,18 @@ pub fn judged(
         }
         rows.push(row);
     }
+    let rough: Vec<&str> =
+        rows.iter().filter(|row| row.determined && !row.smooth).map(|row| row.key).collect();
+    if !rough.is_empty() {
+        notes.push(format!(
+            "the log-likelihood is rough about the maximum, because readings are taken or left as a whole: intervals are too \
+             narrow for {}",
+            rough.join(", ")
+        ));
+    }
+    let measurements = search::count(&problem, &maximum.x);
+    let gain = maximum.value - without_outliers(&problem, &maximum.x);
+    let garbage = search::pays(gain, measurements);
     let last = information.ranges.last();
     let outliers = OutliersJson {
         share,
@@ -128,6 +150,8 @@ pub fn judged(
             .and_then(|range| range.interval(*maximum.x.last()?))
             .map(|ends| ends.map(|x| 1.0 / (1.0 + (-x).exp()))),
         reach_m,
+        gain,
+        found: garbage,
     };
     if !information.definite {
         notes.push("the log-likelihood is not that of a maximum where the search ended; intervals are from the scores alone".to_owned());
@@ -135,13 +159,13 @@ pub fn judged(
     let replayed = team.agents.values().next().map(|agent| agent.filter.fold(None)).unwrap_or_default();
     let judge = |levels: &Levels| judge(&gathered.facts, levels, &replayed, reach_m);
     let mut noise = BTreeMap::new();
-    for (robot, file) in files(&team.agents, &tuned, args.clutter.then_some((share, reach_m))) {
+    for (robot, file) in files(&team.agents, &tuned, garbage.then_some((share, reach_m))) {
         noise.insert(robot, toml::to_string(&file).context("the noise found cannot be written")?);
     }
     Ok(TuneJson {
         recording: name.to_owned(),
         command: command_line(),
-        measurements: problem.densities(&maximum.x).iter().filter(|density| **density != 0.0).count(),
+        measurements,
         levels: rows,
         outliers,
         before: judge(&gathered.start),
@@ -201,6 +225,7 @@ fn row(
         robust_error: range.robust_error.filter(|_| determined),
         falls: range.falls,
         determined,
+        smooth: range.is_smooth(),
         at_most,
     }
 }
@@ -222,6 +247,15 @@ fn most(found: f64, fall: &dyn Fn(f64) -> f64) -> Option<f64> {
     Some(most)
 }
 
+/// The log-likelihood with next to no outliers, all else as at `x`.
+fn without_outliers(problem: &Problem, x: &[f64]) -> f64 {
+    let mut point = x.to_vec();
+    if let (Some(share), Some(least)) = (point.last_mut(), problem.bounds().0.last()) {
+        *share = *least;
+    }
+    problem.densities(&point).iter().sum()
+}
+
 fn undetermined(row: &LevelJson) -> String {
     let what = match row.at_most {
         Some(most) => format!("the data only say that it is at most {}", super::words::short(most)),
@@ -241,6 +275,14 @@ fn judge(facts: &[TunableFact], levels: &Levels, replayed: &FoldConfig, reach_m:
     let (lower, upper) = only.bounds();
     let best =
         maximize(&search::evaluator(&only), &only.point(levels, search::SHARE), (&lower, &upper), 0.01);
+    let weighed = scores(facts, levels, &only.config(only.at(&best.x).1)).into_iter().flatten();
+    let (mut something, mut degrees, mut nothing, mut of_nothing) = (0.0, 0.0, 0.0, 0.0);
+    for score in weighed {
+        something += score.weight * score.nis;
+        degrees += score.weight * score.dimension as f64;
+        nothing += (1.0 - score.weight) * score.nis;
+        of_nothing += 1.0 - score.weight;
+    }
     let config = FoldConfig { relinearize: None, ..*replayed };
     let scores: Vec<_> = scores(facts, levels, &config).into_iter().flatten().collect();
     let all = NisSummary::from_values(scores.iter().map(|score| (score.nis, score.dimension)));
@@ -261,6 +303,9 @@ fn judge(facts: &[TunableFact], levels: &Levels, replayed: &FoldConfig, reach_m:
         within_95: all.map_or(0.0, |all| all.share_within_95),
         rejected: scores.len() - used.len(),
         nis_share_rejected: 1.0 - sum(&mut used.iter().map(|score| score.nis)) / whole.max(f64::MIN_POSITIVE),
+        nis_weighed: something / degrees.max(1.0),
+        of_nothing,
+        nis_share_of_nothing: nothing / (something + nothing).max(f64::MIN_POSITIVE),
     }
 }
 
@@ -277,9 +322,8 @@ fn files(
             sensors: agent.sensors.clone(),
             calibration: None,
         };
-        if let Some((share, reach_m)) = clutter {
-            noise.filter.clutter = Some(pleiad_agent::config::ClutterSection { share, reach_m });
-        }
+        noise.filter.clutter =
+            clutter.map(|(share, reach_m)| pleiad_agent::config::ClutterSection { share, reach_m });
         levels::write(&tuned.rounded(), &mut noise.motion, &mut noise.sensors);
         (robot.to_string(), noise)
     };

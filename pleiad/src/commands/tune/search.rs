@@ -127,8 +127,7 @@ pub fn search<'a>(
         }
         let Some((level, wider, end)) = best else { break };
         let gain = end.value - maximum.value;
-        // Bayesian information criterion (Schwarz 1978): a level costs half the logarithm of the number of data.
-        if 2.0 * gain <= (measurements as f64).ln() {
+        if !pays(gain, measurements) {
             tried.extend(gains.into_iter().map(|(level, gain)| Tried { level, gain, kept: false }));
             break;
         }
@@ -178,7 +177,12 @@ fn widened<'a>(
     (wider, Maximum { evaluations, ..end })
 }
 
+/// Bayesian information criterion (Schwarz 1978): a parameter costs half the logarithm of the number of data.
+pub fn pays(gain: f64, measurements: usize) -> bool {
+    2.0 * gain > (measurements as f64).ln()
+}
+
 /// The number of measurements.
-fn count(problem: &Problem, x: &[f64]) -> usize {
+pub fn count(problem: &Problem, x: &[f64]) -> usize {
     problem.densities(x).iter().filter(|density| **density != 0.0).count()
 }

@@ -27,7 +27,8 @@ pub fn text(json: &TuneJson) -> String {
     let _ = writeln!(text, "{:<42} {:>9} {:>9}   95 % interval", "level", "start", "found");
     for level in &json.levels {
         let interval = match (level.interval_95, level.at_most) {
-            (Some([low, high]), _) => format!("{} to {}", short(low), short(high)),
+            (Some([low, high]), _) if level.smooth => format!("{} to {}", short(low), short(high)),
+            (Some([low, high]), _) => format!("{} to {}, too narrow (see below)", short(low), short(high)),
             (None, Some(most)) => format!("at most {}", short(most)),
             (None, None) => "not determined".to_owned(),
         };
@@ -51,10 +52,13 @@ pub fn text(json: &TuneJson) -> String {
         short(json.outliers.share)
     );
     let _ = writeln!(text, "{:<42} {:>9} {:>9}", "", "start", "found");
-    let rows: [Row; 6] = [
+    let rows: [Row; 9] = [
         ("log-likelihood", |of| format!("{:.1}", of.log_likelihood)),
         ("NIS per degree of freedom, all", |of| format!("{:.2}", of.nis)),
         ("NIS per degree of freedom, used", |of| format!("{:.2}", of.nis_used)),
+        ("NIS per degree of freedom, weighed", |of| format!("{:.2}", of.nis_weighed)),
+        ("of nothing, by their probabilities", |of| format!("{:.1}", of.of_nothing)),
+        ("share of the NIS that those have, %", |of| format!("{:.1}", 100.0 * of.nis_share_of_nothing)),
         ("median NIS over that of chi-square", |of| format!("{:.2}", of.nis_median)),
         ("within the 95 % bound, %", |of| format!("{:.1}", 100.0 * of.within_95)),
         ("refused by the gate", |of| of.rejected.to_string()),
