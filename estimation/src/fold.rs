@@ -4,13 +4,15 @@ mod across;
 mod config;
 mod window;
 
-pub use config::{Clutter, DEFAULT_GATE, FOLD_VERSION, FoldConfig};
+pub use config::{Clutter, DEFAULT_GATE, FOLD_VERSION, FoldConfig, Inflation, Quarantine};
 pub use window::Relinearization;
 pub(crate) use window::fold_blocks;
 
 use crate::fact::{Boot, EntryId, Noise, NominalState, Quantity};
 use crate::geometry::{Matrix3, Vector2, Vector3};
-use crate::joint::{ErrorForm, Joint, ParameterKind, Participant, Update, clock_influence};
+use crate::joint::{
+    Distrust, ErrorForm, Joint, ParameterKind, Participant, Surprise, Update, clock_influence,
+};
 use crate::measurement::{self, Linearization, Unusable};
 use crate::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timestamp};
 
@@ -92,6 +94,8 @@ pub enum SkipReason {
     /// The landmark has no place in the team's map yet, and a range or a bearing alone does not give it one; nor does
     /// the additive form map landmarks.
     NotMapped(LandmarkId),
+    /// It contradicts the others or, alone, the map, and is not believed on that until it boots again.
+    Distrusted(RobotId),
 }
 
 /// What the fold did with a fact.
@@ -190,7 +194,7 @@ fn fold_observation(
     observer: &NominalState,
     other: Option<&(BootIndex, NominalState)>,
 ) -> Result<Residual, SkipReason> {
-    let noise = measurement::noise_matrix(&usable(quantity, noise)?);
+    let mut noise = measurement::noise_matrix(&usable(quantity, noise)?);
     if let Quantity::Absolute(crate::fact::Absolute::Pose(z)) = quantity
         && (joint.index(key.id.robot).is_none() || joint.is_alone(key.id.robot))
     {
@@ -198,6 +202,10 @@ fn fold_observation(
         return Ok(Residual::without_measurement(Outcome::Placed));
     }
     let taken = taken(joint, key, quantity, observer, other)?;
+    if let Some(robot) = joint.distrusted(robots(&taken), !matches!(quantity, Quantity::Robot { .. })) {
+        return Err(SkipReason::Distrusted(robot));
+    }
+    noise *= joint.part(taken[0].0).noise_level;
     for (index, state) in &taken {
         if let Some(state) = state {
             joint.propagate(*index, state);
@@ -220,7 +228,45 @@ fn fold_observation(
     let at = linearize(quantity, &poses)?;
     let mut participants = participants(quantity, &taken, &influences, &at);
     let odds = config.clutter.map(|clutter| clutter.log_odds(quantity));
-    update(joint, config, &at, &noise, &mut participants, odds)
+    let (residual, weight) = update(joint, config, &at, &noise, &mut participants, odds)?;
+    reflect(joint, config, key.time, &taken, (residual.dimension, residual.nis, weight), config.join);
+    Ok(residual)
+}
+
+/// What a reading says of those who took part, besides where they are, by its dimension, its normalized innovation squared and
+/// the probability that it is of something. With `detach` a robot that contradicts the others may begin a frame of its own.
+fn reflect(
+    joint: &mut Joint,
+    config: &FoldConfig,
+    time: Timestamp,
+    taken: &[Taken],
+    (dimension, nis, weight): (usize, f64, f64),
+    detach: bool,
+) {
+    if config.inflation.is_none() && config.quarantine.is_none() {
+        return;
+    }
+    // An open gate does not bound what one reading may say.
+    let gate = config.gate[dimension - 1].min(DEFAULT_GATE[dimension - 1]);
+    let nothing = config.clutter.map_or(0.0, |clutter| clutter.share);
+    let surprise = Surprise { time, dimension, nis, gate, weight, nothing };
+    let robots: Vec<usize> = robots(taken).collect();
+    if let Some(inflation) = &config.inflation {
+        joint.follow(inflation, &robots, &surprise);
+    }
+    if let Some(quarantine) = &config.quarantine
+        && let Some((robot, whole)) = joint.weigh(quarantine, &robots, &surprise)
+    {
+        let distrust = Distrust { since: time, whole };
+        if !(detach && whole && joint.detach(robot, time, quarantine.last_chance(time))) {
+            joint.distrust(robot, distrust);
+        }
+    }
+}
+
+/// Blocks of the robots that take part.
+fn robots(taken: &[Taken]) -> impl Iterator<Item = usize> {
+    taken.iter().filter_map(|(index, state)| state.map(|_| *index))
 }
 
 /// What besides a robot's own error moves its pose as a measurement sees it: the block, which pose of those in the order of
@@ -362,15 +408,15 @@ fn update(
     noise: &Matrix3,
     participants: &mut [Participant],
     odds: Option<f64>,
-) -> Result<Residual, SkipReason> {
+) -> Result<(Residual, f64), SkipReason> {
     let threshold = config.gate[at.dimension - 1];
-    let (outcome, nis) =
+    let (outcome, nis, weight) =
         match joint.update(at.dimension, &at.innovation, noise, participants, threshold, odds) {
-            Update::Used { nis } => (Outcome::Used, nis),
-            Update::Rejected { nis, threshold } => (Outcome::Rejected { threshold }, nis),
+            Update::Used { nis, weight } => (Outcome::Used, nis, weight),
+            Update::Rejected { nis, threshold, weight } => (Outcome::Rejected { threshold }, nis, weight),
             Update::Indefinite => return Err(SkipReason::Noise),
         };
-    Ok(Residual { outcome, dimension: at.dimension, innovation: at.innovation, nis })
+    Ok((Residual { outcome, dimension: at.dimension, innovation: at.innovation, nis }, weight))
 }
 
 fn dimension(quantity: &Quantity) -> usize {

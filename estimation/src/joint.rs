@@ -4,6 +4,7 @@ mod block;
 mod boots;
 mod component;
 mod covariance;
+mod standing;
 mod view;
 
 pub use block::{Block, MappedLandmark, Member, ParameterKind, Parameters};
@@ -11,6 +12,8 @@ pub(crate) use component::Placement;
 pub use component::{Anchor, Component, End, Measured, Tie};
 pub use covariance::JointCovariance;
 pub(crate) use covariance::{Prepared, squared};
+pub(crate) use standing::Surprise;
+pub use standing::{Contradiction, Distrust};
 pub(crate) use view::{RobotView, clock_influence};
 
 use crate::fact::NominalState;
@@ -38,6 +41,8 @@ pub struct JointParts {
     pub lower: Vec<f64>,
     /// What was measured across components.
     pub ties: Vec<Tie>,
+    /// Who contradicts whom.
+    pub contradictions: Vec<Contradiction>,
     /// How many measurements went into it.
     pub updates: u64,
 }
@@ -55,6 +60,8 @@ pub enum Update {
     Used {
         /// Normalized innovation squared.
         nis: f64,
+        /// Probability that it is not of nothing; 1 where nothing is.
+        weight: f64,
     },
     /// The innovation failed the gate; nothing but process noise entered.
     Rejected {
@@ -62,6 +69,8 @@ pub enum Update {
         nis: f64,
         /// The gate.
         threshold: f64,
+        /// Probability that it is not of nothing; 1 where nothing is.
+        weight: f64,
     },
     /// The innovation covariance is not positive definite: the noise given was not.
     Indefinite,
@@ -74,6 +83,8 @@ pub struct Joint {
     blocks: Vec<Block>,
     covariance: JointCovariance,
     ties: Vec<Tie>,
+    /// In the order of author and whom it measured.
+    contradictions: Vec<Contradiction>,
     updates: u64,
 }
 
@@ -85,6 +96,7 @@ impl Joint {
             blocks: Vec::new(),
             covariance: JointCovariance::default(),
             ties: Vec::new(),
+            contradictions: Vec::new(),
             updates: 0,
         }
     }
@@ -158,11 +170,13 @@ impl Joint {
             blocks: blocks.collect(),
             lower: self.covariance.lower().to_vec(),
             ties: self.ties.clone(),
+            contradictions: self.contradictions.clone(),
             updates: self.updates,
         }
     }
 
-    /// The joint of these parts; `None` if the covariance does not have rows for every block.
+    /// The joint of these parts; `None` if the covariance does not have rows for every block, a tie has no anchor, or
+    /// contradictions are not in order.
     pub fn from_parts(form: ErrorForm, parts: JointParts) -> Option<Self> {
         let covariance = JointCovariance::from_lower(3 * parts.blocks.len(), parts.lower)?;
         let blocks = parts.blocks.into_iter().map(|(block, placed)| match block {
@@ -174,8 +188,11 @@ impl Joint {
             End::Anchor(index) => matches!(blocks.get(*index), Some(Block::Anchor(_))),
             End::Map | End::Point(_) => true,
         };
-        let sound = parts.ties.iter().all(|tie| tie.ends.iter().all(anchored));
-        sound.then_some(Self { form, blocks, covariance, ties: parts.ties, updates: parts.updates })
+        let pairs = parts.contradictions.iter().map(|of| (of.author, of.of));
+        let sound =
+            pairs.is_sorted_by(|a, b| a < b) && parts.ties.iter().all(|tie| tie.ends.iter().all(anchored));
+        let JointParts { ties, contradictions, updates, .. } = parts;
+        sound.then_some(Self { form, blocks, covariance, ties, contradictions, updates })
     }
 
     /// Estimate and covariance of one robot at `state` of its nominal trajectory, when its clock shows `time`. The covariance is of
@@ -253,6 +270,9 @@ impl Joint {
         self.move_by_parameters(index, state);
         let member = self.part(index);
         let mut added = state.noise_sum.minus(member.folded_noise).congruence(&member.correction.adjoint());
+        if member.noise_level != 1.0 {
+            added = added.scaled(member.noise_level);
+        }
         if self.form == ErrorForm::Additive {
             let pose = member.correction.compose(&state.nominal);
             let last = member.correction.compose(&member.nominal);
@@ -379,25 +399,25 @@ impl Joint {
             return Update::Indefinite;
         };
         let nis = prepared.nis();
+        let weight = clutter.map_or(1.0, |odds| prepared.weight_in_clutter(odds));
         if nis > threshold {
-            return Update::Rejected { nis, threshold };
+            return Update::Rejected { nis, threshold, weight };
         }
         self.updates += 1;
-        if let Some(odds) = clutter {
-            self.update_in_clutter(&prepared, odds);
-            return Update::Used { nis };
+        if clutter.is_some() {
+            self.update_in_clutter(&prepared, weight);
+            return Update::Used { nis, weight };
         }
         self.covariance.downdate(&prepared);
         for index in 0..self.blocks.len() {
             self.correct(index, prepared.correction(index));
         }
-        Update::Used { nis }
+        Update::Used { nis, weight }
     }
 
     /// An update with a measurement that may be of nothing: the mixture of both, with its mean and covariance
-    /// (`barshalom1975`).
-    fn update_in_clutter(&mut self, prepared: &Prepared, odds: f64) {
-        let weight = prepared.weight_in_clutter(odds);
+    /// (`barshalom1975`); `weight` is the probability that it is not.
+    fn update_in_clutter(&mut self, prepared: &Prepared, weight: f64) {
         self.reduce_in_clutter(prepared, weight);
         for index in 0..self.blocks.len() {
             self.correct(index, prepared.correction(index) * weight);
@@ -434,6 +454,7 @@ impl Joint {
     pub(crate) fn words(&self) -> impl Iterator<Item = u64> + '_ {
         let blocks = self.blocks.iter().flat_map(Block::words);
         let blocks = blocks.chain(self.ties.iter().flat_map(Tie::words));
+        let blocks = blocks.chain(self.contradictions.iter().flat_map(Contradiction::words));
         blocks.chain(self.covariance.lower().iter().map(|entry| entry.to_bits()))
     }
 }

@@ -1,6 +1,7 @@
 //! What decides the bits of an estimate besides the facts.
 
 use super::Relinearization;
+use crate::Timestamp;
 use crate::fact::{Absolute, Fingerprint, Quantity};
 use crate::joint::ErrorForm;
 use crate::sample::Relative;
@@ -20,6 +21,10 @@ pub struct FoldConfig {
     pub gate: [f64; 3],
     /// Some observations are of nothing; `None` if all are of what they say.
     pub clutter: Option<Clutter>,
+    /// Stated levels of noise are raised where readings surprise; `None` if they are what is stated.
+    pub inflation: Option<Inflation>,
+    /// A robot that contradicts the others is not believed any more; `None` if everybody always is.
+    pub quarantine: Option<Quarantine>,
     /// A robot without a prior begins a frame of its own, until what is seen between frames tells how they lie to one another.
     /// Without it such a robot has no place.
     pub join: bool,
@@ -64,9 +69,42 @@ impl Clutter {
     }
 }
 
+/// Levels of noise that follow the readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inflation {
+    /// Over how many readings of a robot.
+    pub readings: f64,
+    /// Largest factor on its variances; they are never below what is stated.
+    pub most: f64,
+}
+
+/// When a robot is not believed any more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quarantine {
+    /// Logarithm of the odds, nats, by which the robot must be likelier to be what is wrong than any other.
+    pub level: f64,
+    /// Whom it has not measured, and who has not measured it, for so long is not asked, ns.
+    pub window_ns: i64,
+}
+
+impl Quarantine {
+    /// A robot that was taken out of its frame since, and contradicts the others again, is not believed.
+    pub(super) fn last_chance(&self, now: Timestamp) -> Timestamp {
+        Timestamp(now.0.saturating_sub(self.window_ns.saturating_mul(10)))
+    }
+}
+
 impl Default for FoldConfig {
     fn default() -> Self {
-        Self { form: ErrorForm::Invariant, gate: DEFAULT_GATE, clutter: None, join: false, relinearize: None }
+        Self {
+            form: ErrorForm::Invariant,
+            gate: DEFAULT_GATE,
+            clutter: None,
+            inflation: None,
+            quarantine: None,
+            join: false,
+            relinearize: None,
+        }
     }
 }
 
@@ -87,6 +125,10 @@ impl FoldConfig {
         // Told apart from what follows by their number.
         let words = words.chain(clutter).chain(self.clutter.iter().map(|_| 1)).chain(together);
         let words = words.chain(self.join.then_some(2));
+        let inflation = self.inflation.iter().flat_map(|of| [of.readings.to_bits(), of.most.to_bits(), 3]);
+        let quarantine =
+            self.quarantine.iter().flat_map(|of| [of.level.to_bits(), of.window_ns.cast_unsigned(), 4]);
+        let words = words.chain(inflation).chain(quarantine);
         let Fingerprint(bytes) = Fingerprint::of_words(words);
         bytes[..8].iter().fold(0, |hash, byte| hash << 8 | u64::from(*byte))
     }

@@ -14,7 +14,7 @@ use crate::fold::{
     taken,
 };
 use crate::geometry::{Matrix3, Vector3};
-use crate::joint::{Block, ErrorForm, Joint, Participant, Prepared};
+use crate::joint::{Block, ErrorForm, Joint, Member, Participant, Prepared};
 use crate::measurement::{self, Linearization};
 use crate::{Pose2, Timestamp, fact::Quantity};
 
@@ -156,6 +156,8 @@ struct Trace {
     rows: Vec<[Vec<f64>; 3]>,
     /// The update, if there was one, with its participants.
     update: Option<(Prepared, Vec<Participant>)>,
+    /// In the last pass dimension, normalized innovation squared and probability of being of something.
+    surprise: Option<(usize, f64, f64)>,
 }
 
 fn fold_stretch(
@@ -179,6 +181,17 @@ fn fold_stretch(
         told(index, residual, &|| pass.clone().ended());
     }
     *joint = pass.ended();
+    if let (true, Some(quarantine)) = (config.join, &config.quarantine) {
+        // Within a stretch nobody changes frames: who was found to contradict the others in it does at its end.
+        let began = facts.first().map_or(Timestamp::MIN, |(key, _)| key.time);
+        let found = |member: &Member| {
+            member.distrust.filter(|of| of.whole && of.since >= began).map(|of| (member.robot, of.since))
+        };
+        let found: Vec<_> = joint.members().filter_map(found).collect();
+        for (robot, since) in found {
+            joint.detach(robot, since, quarantine.last_chance(since));
+        }
+    }
 }
 
 fn event<'a>(joint: &Joint, key: &FactKey, fact: &'a Fact) -> Result<Event<'a>, SkipReason> {
@@ -270,12 +283,39 @@ impl Pass {
         at: Option<&[Pose2]>,
         last: bool,
     ) -> (Residual, Trace) {
+        let (residual, trace) = self.absorb(config, event, at, last);
+        if let Some((dimension, nis, weight)) = trace.surprise {
+            super::reflect(
+                &mut self.joint,
+                config,
+                event.time,
+                &event.participants,
+                (dimension, nis, weight),
+                false,
+            );
+        }
+        (residual, trace)
+    }
+
+    fn absorb(
+        &mut self,
+        config: &FoldConfig,
+        event: &Event<'_>,
+        at: Option<&[Pose2]>,
+        last: bool,
+    ) -> (Residual, Trace) {
         let mut trace = Trace {
             at: Vec::with_capacity(2),
             couplings: Vec::new(),
             rows: Vec::with_capacity(2),
             update: None,
+            surprise: None,
         };
+        let of_map = !matches!(event.quantity, Quantity::Robot { .. });
+        if let Some(robot) = self.joint.distrusted(super::robots(&event.participants), of_map) {
+            let outcome = Outcome::Skipped(SkipReason::Distrusted(robot));
+            return (Residual::without_measurement(outcome), trace);
+        }
         for (which, (index, state)) in event.participants.iter().enumerate() {
             if let Some((row, by)) =
                 state.as_ref().and_then(|state| self.joint.move_by_parameters(*index, state))
@@ -317,15 +357,24 @@ impl Pass {
         let residual = |outcome, nis| Residual { outcome, dimension, innovation, nis };
         let prepare =
             |noise: &Matrix3| self.joint.covariance().prepare(dimension, &innovation, noise, &participants);
+        let stated = event.noise * self.joint.part(event.participants[0].0).noise_level;
         let weight = match (&config.clutter, at) {
-            (Some(_), Some(_)) => weight(&linearized, &event.noise, threshold),
+            (Some(_), Some(_)) => weight(&linearized, &stated, threshold),
             _ => 1.0,
         };
-        let noise = event.noise / weight;
+        let noise = stated / weight;
         let Some(mut prepared) = prepare(&noise) else {
             return (Residual::without_measurement(Outcome::Skipped(SkipReason::Noise)), trace);
         };
         let nis = prepared.nis();
+        if last {
+            // Softer noise is for the update; what is surprising is so by what was stated.
+            let stated = if weight < 1.0 { prepare(&stated) } else { None };
+            let of = stated.as_ref().unwrap_or(&prepared);
+            let odds = config.clutter.map(|clutter| clutter.log_odds(event.quantity));
+            let weight = odds.map_or(1.0, |odds| of.weight_in_clutter(odds));
+            trace.surprise = Some((dimension, of.nis(), weight));
+        }
         if nis > threshold {
             let softer = prepare(&(noise * (nis / threshold))).filter(|_| !last && config.clutter.is_none());
             let Some(softer) = softer else {

@@ -323,6 +323,7 @@ pub(super) fn joint_at(pose: &Pose2, covariance: &Matrix3, at: &NominalState, up
         blocks: vec![(Block::Robot(member), true)],
         lower: lower.to_vec(),
         ties: Vec::new(),
+        contradictions: Vec::new(),
         updates,
     };
     // A robot's block has six entries: there is nothing that could not fit.

@@ -22,6 +22,7 @@ impl Joint {
 
     /// A boot begins: a continued one carries the robot's block on, a lost one ends it.
     pub(crate) fn boot(&mut self, robot: RobotId, index: BootIndex, boot: &Boot) {
+        self.absolve(robot);
         let row = self.index(robot);
         let carried_on = match (&boot.continuation, row) {
             (Some(continuation), Some(row)) if continuation.previous == self.part(row).boot => {
@@ -82,6 +83,10 @@ impl Joint {
             .sensitivity
             .map_or_else(Matrix3::zeros, |last| s.adjoint() * (member.folded_motion - last.motion));
         member.boot = index;
+        // Whoever begins anew is believed anew.
+        member.distrust = None;
+        member.detached = None;
+        member.doubt = [0.0; 2];
         if form == ErrorForm::Additive {
             // Its coordinates do not stay put, so that what is carried is folded here, with the gap.
             let gap = continuation.gap.congruence(&boot.nominal.adjoint());

@@ -242,7 +242,7 @@ impl Slam {
             &self.settings.gate,
         );
         match update {
-            Ok(Update::Used { nis }) => {
+            Ok(Update::Used { nis, .. }) => {
                 let entry = &mut self.map[known];
                 entry.sightings += 1;
                 entry.confirmed |= entry.sightings >= self.settings.confirm_sightings;

@@ -276,7 +276,7 @@ impl SlamState {
         let Some(prepared) = prepared else { return Ok(Update::Indefinite) };
         let (nis, threshold) = (prepared.nis(), gate[linear.dimension - 1]);
         if nis > threshold {
-            return Ok(Update::Rejected { nis, threshold });
+            return Ok(Update::Rejected { nis, threshold, weight: 1.0 });
         }
         self.covariance.downdate(&prepared);
         for (index, (kind, place)) in self.places.iter_mut().enumerate() {
@@ -291,6 +291,6 @@ impl SlamState {
                 }
             };
         }
-        Ok(Update::Used { nis })
+        Ok(Update::Used { nis, weight: 1.0 })
     }
 }

@@ -85,18 +85,54 @@ pub fn gaussian(random: &mut ChaCha8Rng) -> f64 {
 pub struct World<'a> {
     /// The first robot has GPS.
     pub gps: bool,
+    /// All have it.
+    pub all_gps: bool,
     /// Landmarks that nobody knows the places of.
     pub landmarks: &'a [[f64; 2]],
     /// Share of sightings of robots that are of nothing: any range and any bearing.
     pub garbage: f64,
     /// Noise of the odometry, over [`NOISE`].
     pub slip: f64,
+    /// By how much it is more than what is stated.
+    pub understated: f64,
     /// Ticks between sightings of robots.
     pub every: i64,
     /// Which robots are told where they start: bit 0 is the first.
     pub told: u32,
     /// What sightings of robots measure.
     pub kind: Kind,
+    /// A robot that does not say what it should, from a tick on.
+    pub lie: Option<Lie>,
+    /// A robot, counted from 0, that is shoved to its left at a tick, by so many metres: an honest one that errs.
+    pub shove: Option<(usize, i64, f64)>,
+}
+
+/// What a robot says beside the truth.
+#[derive(Clone, Copy, Debug)]
+pub struct Lie {
+    /// Which robot, counted from 0.
+    pub robot: usize,
+    /// From which tick on.
+    pub from: i64,
+    /// Added to its fixes, and to where it says that it starts, m.
+    pub fix_m: [f64; 2],
+    /// Added to range and bearing of what it sees.
+    pub sighting: [f64; 2],
+    /// Added to the nominal positions with which it answers, m.
+    pub answer_m: f64,
+}
+
+impl Lie {
+    /// A robot that says what it should.
+    pub fn none(robot: usize, from: i64) -> Self {
+        Self { robot, from, fix_m: [0.0; 2], sighting: [0.0; 2], answer_m: 0.0 }
+    }
+}
+
+impl World<'_> {
+    fn lies(&self, robot: usize, tick: i64) -> Option<Lie> {
+        self.lie.filter(|lie| lie.robot == robot && tick >= lie.from)
+    }
 }
 
 /// What a sighting measures.
@@ -113,12 +149,16 @@ impl Default for World<'_> {
     fn default() -> Self {
         Self {
             gps: true,
+            all_gps: false,
             landmarks: &[],
             garbage: 0.0,
             slip: 1.0,
+            understated: 1.0,
             every: 4,
             told: u32::MAX,
             kind: Kind::RangeBearing,
+            lie: None,
+            shove: None,
         }
     }
 }
@@ -150,13 +190,18 @@ pub fn run(
             let [scale, turn, bias] = wrong.motion;
             let moved = Vector3::new(said.x * (1.0 + scale), 0.0, said.z * (1.0 + turn) - bias * TICK_S);
             truth.push(home.compose(&Pose2::exp(moved)).compose(&Pose2::exp(Vector3::from(noise))));
+            if let (Some((who, tick, by)), Some(last)) = (world.shove, truth.last_mut())
+                && (who, tick + BEFORE) == (index, steps.len() as i64)
+            {
+                *last = last.compose(&Pose2::new(0.0, by, 0.0));
+            }
             steps.push(said);
         }
         let nominal = NominalTrajectory::new(Timestamp(0), Pose2::identity(), usize::MAX).calibrated();
         let mut robot = Robot { wrong: *wrong, told: *told, truth, trajectory: nominal, entries: Vec::new() };
         let first = BEFORE - wrong.late_ticks;
         for tick in 0..=ticks {
-            let [x, y, yaw] = NOISE.map(|sigma| (world.slip * sigma).powi(2) * TICK_S);
+            let [x, y, yaw] = NOISE.map(|sigma| (world.slip / world.understated * sigma).powi(2) * TICK_S);
             robot.trajectory.extend(&Step {
                 from: Timestamp(tick * TICK_NS),
                 to: Timestamp((tick + 1) * TICK_NS),
@@ -177,6 +222,8 @@ pub fn run(
         robot.say(number, Body::Boot(boot), extension);
         let error = PRIOR.map(|sigma| sigma * gaussian(&mut random));
         let prior = robot.at_label(0).compose(&Pose2::exp(Vector3::from(error)));
+        let [x, y] = world.lies(index, 0).map_or([0.0; 2], |lie| lie.fix_m);
+        let prior = Pose2::new(x, y, 0.0).compose(&prior);
         let prior = Quantity::Absolute(Absolute::Pose(prior));
         if world.told >> index & 1 == 1 {
             observation(&mut robot, number, 0, prior, &PRIOR);
@@ -198,10 +245,16 @@ pub fn run(
             }
         }
         if world.gps && tick % 20 == 0 {
-            let truth = run.robots[0].at_label(tick);
-            let read = [truth.x_m(), truth.y_m()].map(|p| p + GPS * gaussian(&mut random));
-            let gps = Quantity::Absolute(Absolute::Position(read));
-            observation(&mut run.robots[0], 1, tick, gps, &[GPS; 2]);
+            let with = if world.all_gps { robots.len() } else { 1 };
+            for robot in 0..with {
+                let truth = run.robots[robot].at_label(tick);
+                let mut read = [truth.x_m(), truth.y_m()].map(|p| p + GPS * gaussian(&mut random));
+                if let Some(Lie { fix_m: [x, y], .. }) = world.lies(robot, tick) {
+                    read = [read[0] + x, read[1] + y];
+                }
+                let gps = Quantity::Absolute(Absolute::Position(read));
+                observation(&mut run.robots[robot], robot as u32 + 1, tick, gps, &[GPS; 2]);
+            }
         }
     }
     run
@@ -259,9 +312,13 @@ fn sight(
     if luck < world.garbage {
         relative = Relative::RangeBearing { range_m, bearing_rad };
     }
-    let Relative::RangeBearing { range_m, bearing_rad } = relative else { unreachable!() };
+    let Relative::RangeBearing { mut range_m, mut bearing_rad } = relative else { unreachable!() };
+    if let Some(Lie { sighting: [range, bearing], .. }) = world.lies(observer, tick) {
+        range_m += range;
+        bearing_rad += bearing;
+    }
     let (relative, sigmas): (Relative, &[f64]) = match world.kind {
-        Kind::RangeBearing => (relative, &SIGHTING),
+        Kind::RangeBearing => (Relative::RangeBearing { range_m, bearing_rad }, &SIGHTING),
         Kind::Range => (Relative::Range { range_m }, &SIGHTING[..1]),
         Kind::Bearing => (Relative::Bearing { bearing_rad }, &SIGHTING[1..]),
         Kind::Position => {
@@ -276,7 +333,10 @@ fn sight(
     };
     let quantity = Quantity::Robot { robot: RobotId(other as u32 + 1), relative };
     let id = observation(&mut run.robots[observer], observer as u32 + 1, tick, quantity, sigmas);
-    let state = run.robots[other].trajectory.at(Timestamp(tick * TICK_NS)).expect("kept");
+    let mut state = run.robots[other].trajectory.at(Timestamp(tick * TICK_NS)).expect("kept");
+    if let Some(Lie { answer_m, .. }) = world.lies(other, tick) {
+        state.nominal = Pose2::new(answer_m, 0.0, 0.0).compose(&state.nominal);
+    }
     let answer = Answer::State { boot: BootIndex(0), state };
     let extension = run.robots[other].extension(tick);
     run.robots[other].say(other as u32 + 1, Body::Half(Half { observation: id, answer }), extension);

@@ -2,7 +2,8 @@
 
 use pleiad_estimation::geometry::Matrix3;
 use pleiad_estimation::joint::{
-    Anchor, Block, Component, End, MappedLandmark, Measured, Member, ParameterKind, Parameters, Tie,
+    Anchor, Block, Component, Contradiction, Distrust, End, MappedLandmark, Measured, Member, ParameterKind,
+    Parameters, Tie,
 };
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, LandmarkId, RobotId, Timestamp};
@@ -22,6 +23,12 @@ pub(super) struct WireMember {
     /// By columns; none if nothing was ever folded.
     folded_motion: Option<[f64; 9]>,
     component: WireComponent,
+    /// None is 1.
+    noise_level: Option<f64>,
+    doubt: Option<[f64; 2]>,
+    detached_ns: Option<i64>,
+    /// Since when, and whether in whole.
+    distrust: Option<(i64, bool)>,
     placed: bool,
 }
 
@@ -90,6 +97,18 @@ impl TryFrom<WireMember> for (Member, bool) {
             member.folded_motion = Matrix3::from_column_slice(&columns);
         }
         member.component = component(wire.component);
+        if let Some(level) = wire.noise_level {
+            member.noise_level = check::number("noise_level", level)?;
+            if level < 1.0 {
+                let expected = "at least 1";
+                return Err(ProtocolError::Number { field: "noise_level".into(), found: level, expected });
+            }
+        }
+        if let Some(doubt) = wire.doubt {
+            member.doubt = check::pair("doubt", doubt)?;
+        }
+        member.detached = wire.detached_ns.map(Timestamp);
+        member.distrust = wire.distrust.map(|(since, whole)| Distrust { since: Timestamp(since), whole });
         Ok((member, wire.placed))
     }
 }
@@ -161,6 +180,38 @@ impl TryFrom<WireTie> for Tie {
     }
 }
 
+#[derive(Serialize, Deserialize)]
+pub(super) struct WireContradiction {
+    author: u32,
+    /// None is the map.
+    of: Option<u32>,
+    level: f64,
+    readings: f64,
+    surprises: f64,
+    last_ns: i64,
+}
+
+impl TryFrom<WireContradiction> for Contradiction {
+    type Error = ProtocolError;
+
+    fn try_from(wire: WireContradiction) -> Result<Self, ProtocolError> {
+        Ok(Self {
+            author: RobotId(wire.author),
+            of: wire.of.map(RobotId),
+            level: check::number("contradiction.level", wire.level)?,
+            readings: check::number("contradiction.readings", wire.readings)?,
+            surprises: check::number("contradiction.surprises", wire.surprises)?,
+            last: Timestamp(wire.last_ns),
+        })
+    }
+}
+
+pub(super) fn wire_contradiction(of: &Contradiction) -> WireContradiction {
+    let Contradiction { author, of, level, readings, surprises, last } = *of;
+    let (author, of) = (author.0, of.map(|robot| robot.0));
+    WireContradiction { author, of, level, readings, surprises, last_ns: last.0 }
+}
+
 pub(super) fn wire_tie(tie: &Tie) -> WireTie {
     let end = |end: &End| match end {
         End::Map => WireEnd::Map,
@@ -188,6 +239,10 @@ pub(super) fn wire_block(block: &Block, placed: bool) -> WireBlock {
                 folded_motion: (motion != Matrix3::zeros())
                     .then(|| std::array::from_fn(|entry| motion[entry])),
                 component: wire_component(member.component),
+                noise_level: (member.noise_level != 1.0).then_some(member.noise_level),
+                doubt: (member.doubt != [0.0; 2]).then_some(member.doubt),
+                detached_ns: member.detached.map(|at| at.0),
+                distrust: member.distrust.map(|of| (of.since.0, of.whole)),
                 placed,
             })
         }

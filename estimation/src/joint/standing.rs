@@ -1,0 +1,273 @@
+//! How far what robots say is to be believed: levels of noise that grow where readings surprise, and who contradicts whom.
+
+use std::collections::BTreeMap;
+
+use super::{Block, Component, ErrorForm, Joint};
+use crate::fold::{Inflation, Quarantine};
+use crate::{RobotId, Timestamp};
+
+/// What speaks for readings between two being wrong, by what one of them measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contradiction {
+    /// Who measured.
+    pub author: RobotId,
+    /// Whom; `None` is the map: a landmark or a fix.
+    pub of: Option<RobotId>,
+    /// Logarithm of the odds that they are wrong since it was last zero, nats.
+    pub level: f64,
+    /// How many readings there were, each forgotten over the next [`MEMORY`].
+    pub readings: f64,
+    /// How many of them surprised.
+    pub surprises: f64,
+    /// When it measured last.
+    pub last: Timestamp,
+}
+
+/// How much a robot's word is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Distrust {
+    /// Since when.
+    pub since: Timestamp,
+    /// What it says of others, and what others say of it, is not believed either; else only what it says of the map.
+    pub whole: bool,
+}
+
+/// Chi-square at 95 % by dimension: what of sound readings one in twenty exceeds.
+const SURPRISE: [f64; 3] = [3.841, 5.991, 7.815];
+/// Share of a sound robot's readings that surprise, at least: twice as many as there should be, for noise is never what is
+/// stated. Where more of those between others do, it is theirs.
+const SOUND: f64 = 0.1;
+/// Worth of that in readings.
+const PRIOR: f64 = 20.0;
+/// Share of the readings that surprise of a robot with which something is wrong, unless that is common.
+const WRONG: f64 = 0.7;
+/// After so many readings of a kind one is forgotten but for a third.
+const MEMORY: f64 = 64.0;
+/// A level grows up to so many times that which counts, so that what was wrong for an hour can be right within seconds.
+const CAP: f64 = 2.0;
+/// From here on two contradict each other, nats: one surprise where they are rare.
+const CONTRADICTS: f64 = 1.5;
+/// What a reading was, as far as its standing goes.
+pub(crate) struct Surprise {
+    pub time: Timestamp,
+    pub dimension: usize,
+    pub nis: f64,
+    /// Largest that the gate takes.
+    pub gate: f64,
+    /// Probability that it is not of nothing.
+    pub weight: f64,
+    /// Share of the readings that are of nothing, as stated.
+    pub nothing: f64,
+}
+
+/// A level after one more reading, where so large a share of sound ones surprises: the cumulative sum of Page (`page1954`).
+fn counted(level: f64, surprises: bool, sound: f64, most: f64) -> f64 {
+    let wrong = WRONG.max(0.5 * (1.0 + sound));
+    let odds = if surprises { wrong / sound } else { (1.0 - wrong) / (1.0 - sound) };
+    (level + libm::log(odds)).clamp(0.0, most)
+}
+
+impl Contradiction {
+    pub(super) fn words(&self) -> [u64; 6] {
+        let of = self.of.map_or(u64::MAX, |robot| u64::from(robot.0));
+        let [level, readings, surprises] = [self.level, self.readings, self.surprises].map(f64::to_bits);
+        [u64::from(self.author.0), of, level, readings, surprises, self.last.0.cast_unsigned()]
+    }
+
+    /// Who it is between, in their order; the map is first.
+    fn ends(&self) -> [Option<RobotId>; 2] {
+        let ends = [Some(self.author), self.of];
+        [ends[0].min(ends[1]), ends[0].max(ends[1])]
+    }
+}
+
+impl Joint {
+    /// What contradicts what, in the order of author and whom it measured; nothing unless it is kept ([`Quarantine`]).
+    pub fn contradictions(&self) -> &[Contradiction] {
+        &self.contradictions
+    }
+
+    /// The first of the robots in these blocks that is not believed any more, on others or on the map.
+    pub(crate) fn distrusted(
+        &self,
+        mut robots: impl Iterator<Item = usize>,
+        of_map: bool,
+    ) -> Option<RobotId> {
+        let member = robots.find_map(|index| {
+            let member = self.part(index);
+            member.distrust.filter(|distrust| distrust.whole || of_map).map(|_| member)
+        });
+        member.map(|member| member.robot)
+    }
+
+    /// Levels of noise of those who took part move so that squared innovations are what they should be: the score of the
+    /// likelihood by the logarithm of a common level, over its information, over so many readings.
+    pub(crate) fn follow(&mut self, inflation: &Inflation, robots: &[usize], of: &Surprise) {
+        let ratio = of.nis.min(of.gate) / of.dimension as f64;
+        let step = of.weight * (ratio - 1.0) / inflation.readings;
+        for index in robots {
+            let member = self.part_mut(*index);
+            member.noise_level = (member.noise_level * libm::exp(step)).clamp(1.0, inflation.most);
+        }
+    }
+
+    /// Counts a reading for or against those who took part, the author first. Gives the robot that alone explains what is wrong,
+    /// if one does, and whether in whole.
+    pub(crate) fn weigh(
+        &mut self,
+        quarantine: &Quarantine,
+        robots: &[usize],
+        of: &Surprise,
+    ) -> Option<(RobotId, bool)> {
+        let author = self.part(*robots.first()?).robot;
+        let partner = robots.get(1).map(|index| self.part(*index).robot);
+        let most = CAP * quarantine.level;
+        let surprises = of.nis > SURPRISE[of.dimension - 1];
+        let [sound, without_author, without_partner] =
+            self.shares_between_others(author, partner, of, quarantine);
+        for ((index, side), sound) in robots.iter().zip([0, 1]).zip([without_author, without_partner]) {
+            let doubt = &mut self.part_mut(*index).doubt[side];
+            *doubt = counted(*doubt, surprises, sound, most);
+        }
+        let place = self.contradictions.binary_search_by_key(&(author, partner), |of| (of.author, of.of));
+        let place = place.unwrap_or_else(|at| {
+            let last = of.time;
+            let fresh =
+                Contradiction { author, of: partner, level: 0.0, readings: 0.0, surprises: 0.0, last };
+            self.contradictions.insert(at, fresh);
+            at
+        });
+        let pair = &mut self.contradictions[place];
+        pair.level = counted(pair.level, surprises, sound, most);
+        pair.readings = pair.readings * (1.0 - 1.0 / MEMORY) + 1.0;
+        pair.surprises = pair.surprises * (1.0 - 1.0 / MEMORY) + f64::from(u8::from(surprises));
+        pair.last = of.time;
+        if !surprises {
+            return None;
+        }
+        self.explains(quarantine, of.time)
+    }
+
+    /// Stops believing a robot.
+    pub(crate) fn distrust(&mut self, robot: RobotId, distrust: Distrust) {
+        if let Some(index) = self.index(robot) {
+            self.part_mut(index).distrust = Some(distrust);
+            self.acquit(robot, distrust.whole);
+        }
+    }
+
+    /// Takes a robot that contradicts the others out of their frame into one of its own, from which it comes back once what is
+    /// seen between the two agrees on how they lie: an honest robot that was lost does, a liar hardly. `false` if it was
+    /// taken out since `since`, or is in no frame with others; then nothing is done.
+    pub(crate) fn detach(&mut self, robot: RobotId, now: Timestamp, since: Timestamp) -> bool {
+        let Some(index) = self.index(robot) else { return false };
+        let member = self.part(index);
+        let before = member.detached.is_some_and(|last| last >= since);
+        if before || self.form != ErrorForm::Invariant || self.is_alone(robot) {
+            return false;
+        }
+        self.untie_the_lost();
+        self.covariance.clear(index);
+        let member = self.part_mut(index);
+        member.correction = member.nominal.inverse();
+        member.component = Component::new(now, robot);
+        member.detached = Some(now);
+        member.distrust = None;
+        self.acquit(robot, true);
+        true
+    }
+
+    /// Forgets what was held against a robot, now that it is judged; and against the others, whom what it said has moved so that
+    /// they contradict each other for a while.
+    fn acquit(&mut self, robot: RobotId, whole: bool) {
+        if !whole {
+            self.contradictions.retain(|of| of.ends() != [None, Some(robot)]);
+            return;
+        }
+        self.contradictions.clear();
+        for block in &mut self.blocks {
+            if let Block::Robot(member) = block {
+                member.doubt = [0.0; 2];
+            }
+        }
+    }
+
+    /// Shares of the readings that surprise in which neither takes part, and without the author, and without the partner: what
+    /// is common in this team at this time, of robots or of the map, whatever these two say.
+    fn shares_between_others(
+        &self,
+        author: RobotId,
+        partner: Option<RobotId>,
+        of: &Surprise,
+        quarantine: &Quarantine,
+    ) -> [f64; 3] {
+        let least = SOUND + of.nothing * (1.0 - SOUND);
+        let mut counts = [(PRIOR, PRIOR * least); 3];
+        let same_kind = |of: &&Contradiction| of.of.is_some() == partner.is_some();
+        for of in self.fresh(of.time, quarantine).filter(same_kind) {
+            let is = |robot: Option<RobotId>| robot.is_some() && of.ends().contains(&robot);
+            let of_either = [is(Some(author)), is(partner)];
+            let counted = [!of_either[0] && !of_either[1], !of_either[0], !of_either[1]];
+            for ((readings, surprises), _) in counts.iter_mut().zip(counted).filter(|(_, counted)| *counted) {
+                *readings += of.readings;
+                *surprises += of.surprises;
+            }
+        }
+        counts.map(|(readings, surprises)| (surprises / readings).max(least))
+    }
+
+    fn fresh(&self, now: Timestamp, quarantine: &Quarantine) -> impl Iterator<Item = &Contradiction> {
+        let since = now.0.saturating_sub(quarantine.window_ns);
+        self.contradictions.iter().filter(move |of| of.last.0 >= since)
+    }
+
+    /// The robot that explains what is wrong, if one does, and whether in whole.
+    ///
+    /// In whole if enough speaks against what it says or what is said of it, it contradicts two at least, and more than half of those
+    /// it is compared with, and it is much likelier to be what is wrong than any other, or the map. On the map if it contradicts
+    /// that by as much, and two others at least, and more than half of those who are compared with it, do not.
+    fn explains(&self, quarantine: &Quarantine, now: Timestamp) -> Option<(RobotId, bool)> {
+        // Both ways between two are one comparison.
+        let mut between: BTreeMap<[Option<RobotId>; 2], f64> = BTreeMap::new();
+        for of in self.fresh(now, quarantine) {
+            *between.entry(of.ends()).or_default() += of.level;
+        }
+        let mut suspects: BTreeMap<Option<RobotId>, Suspect> = BTreeMap::new();
+        for (ends, level) in &between {
+            for end in ends {
+                let suspect = suspects.entry(*end).or_default();
+                suspect.level += level;
+                suspect.compared += 1;
+                suspect.contradicted += usize::from(*level >= CONTRADICTS);
+            }
+        }
+        let (liar, first) = suspects.iter().max_by(|a, b| a.1.level.total_cmp(&b.1.level))?;
+        let others = suspects.iter().filter(|(other, _)| *other != liar).map(|(_, other)| other.level);
+        let second = others.fold(0.0, f64::max);
+        let many = first.contradicted >= 2 && 2 * first.contradicted > first.compared;
+        let doubted =
+            |robot| self.member(robot).is_some_and(|of| of.doubt[0] + of.doubt[1] >= quarantine.level);
+        if many && first.level - second >= 0.5 * quarantine.level && liar.is_some_and(doubted) {
+            return liar.map(|robot| (robot, true));
+        }
+        let map = suspects.get(&None)?;
+        let sound = map.compared - map.contradicted;
+        let of_map = between.iter().filter(|([end, _], _)| end.is_none());
+        let ([_, robot], level) = of_map.max_by(|a, b| a.1.total_cmp(b.1))?;
+        let alone = *level >= quarantine.level && sound >= 2 && 2 * sound > map.compared;
+        robot.filter(|_| alone).map(|robot| (robot, false))
+    }
+
+    /// Forgets what contradicts a robot, which begins anew.
+    pub(super) fn absolve(&mut self, robot: RobotId) {
+        self.contradictions.retain(|of| !of.ends().contains(&Some(robot)));
+    }
+}
+
+/// What speaks for a robot's, or the map's, being wrong.
+#[derive(Default)]
+struct Suspect {
+    level: f64,
+    compared: usize,
+    contradicted: usize,
+}
