@@ -21,7 +21,7 @@ use pleiad_protocol::TeamName;
 use pleiad_recording::RecordingError;
 use serde::{Deserialize, Serialize};
 
-pub use calibration::{CalibrationSection, ClutterSection};
+pub use calibration::{CalibrationSection, ClutterSection, InflationSection, QuarantineSection};
 use checks::{finite, not_negative, positive, value};
 pub use model::RobotCorrection;
 pub use noises::{AngleNoise, LengthNoise, PoseNoise, RangeBearingNoise, RangeNoise};
@@ -265,6 +265,7 @@ impl AgentConfig {
         }
         self.check_relinearization()?;
         self.check_clutter()?;
+        self.check_standing()?;
         if self.filter.join {
             self.needs_facts("filter.join")?;
         }

@@ -15,7 +15,7 @@ mod views;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-pub use commands::{Command, Event, Notice, Record};
+pub use commands::{Command, Event, Notice, Record, Standing};
 pub use views::SettledEstimate;
 
 use closing::Membership;
@@ -75,6 +75,8 @@ pub struct Node {
     membership: Membership,
     /// Robots of which entries were refused because of the membership, and were told so.
     outsiders: BTreeSet<RobotId>,
+    /// How far robots are believed that are not believed in everything, as told last.
+    standings: BTreeMap<RobotId, Standing>,
     #[cfg(feature = "planted")]
     planted: Option<pleiad_estimation::ledger::Planted>,
     /// Filled while an event is handled.
@@ -116,6 +118,7 @@ impl Node {
             superseded: false,
             membership: Membership::default(),
             outsiders: BTreeSet::new(),
+            standings: BTreeMap::new(),
             #[cfg(feature = "planted")]
             planted: None,
             out: Outbox::default(),

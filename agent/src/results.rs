@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::approximate::Approximate;
 use crate::node::{Node, SettledEstimate};
 
-pub use found::{Found, FoundLandmark, FoundParameter};
+pub use found::{Found, FoundLandmark, FoundParameter, FoundRobot};
 pub(crate) use trajectories::Trajectories;
 
 /// First line of the files of estimates.

@@ -39,6 +39,8 @@ fn full() -> Table {
     let text = "
         model = 'corrected.toml'
         [filter.relinearize]
+        [filter.inflation]
+        [filter.quarantine]
         [filter.clutter]
         share = 0.1
         reach_m = 10.0
@@ -177,6 +179,14 @@ fn documented_defaults_are_the_defaults() {
     }
     for key in ["filter.relinearize.block_s", "filter.relinearize.ahead_s"] {
         defaults.insert(key.to_owned(), Value::Float(5.0));
+    }
+    for (key, default) in [
+        ("filter.inflation.readings", 20.0),
+        ("filter.inflation.most", 10.0),
+        ("filter.quarantine.level", 15.0),
+        ("filter.quarantine.window_s", 30.0),
+    ] {
+        defaults.insert(key.to_owned(), Value::Float(default));
     }
     defaults.insert("filter.relinearize.passes".to_owned(), Value::Integer(4));
     for key in flattened(&full()).keys().filter(|key| key.starts_with("calibration.")) {

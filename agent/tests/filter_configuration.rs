@@ -43,7 +43,12 @@ fn what_is_to_be_found_out_has_values_that_make_sense() {
     let asked = of("[calibration]\nsigma_clock_offset_s = 0.1\nsigma_clock_drift_ppm = 50.0\n").unwrap();
     let [offset_s, drift] = asked.calibration.unwrap().clock;
     assert!((offset_s - 0.1).abs() < 1e-12 && (drift - 50.0e-6).abs() < 1e-12);
-    for text in ["[filter]\njoin = true\n", "[filter]\nclutter = { share = 0.1, reach_m = 8.0 }\n"] {
+    for text in [
+        "[filter]\njoin = true\n",
+        "[filter]\nclutter = { share = 0.1, reach_m = 8.0 }\n",
+        "[filter]\ninflation = {}\n",
+        "[filter]\nquarantine = {}\n",
+    ] {
         assert_ne!(of(text).unwrap().fold.hash(), plain.fold.hash(), "{text}");
     }
     for (text, key) in [
@@ -51,6 +56,11 @@ fn what_is_to_be_found_out_has_values_that_make_sense() {
         ("[filter]\nclutter = { share = 1.0, reach_m = 8.0 }\n", "filter.clutter.share"),
         ("[filter]\nclutter = { share = 0.1, reach_m = -8.0 }\n", "filter.clutter.reach_m"),
         ("strategy = 'pairwise'\n[filter]\nclutter = { share = 0.1, reach_m = 8.0 }\n", "strategy"),
+        ("[filter]\ninflation = { readings = 0.5 }\n", "filter.inflation.readings"),
+        ("[filter]\ninflation = { most = 1.0 }\n", "filter.inflation.most"),
+        ("[filter]\nquarantine = { level = 0.0 }\n", "filter.quarantine.level"),
+        ("[filter]\nquarantine = { window_s = nan }\n", "filter.quarantine.window_s"),
+        ("strategy = 'pairwise'\n[filter]\nquarantine = {}\n", "strategy"),
         ("[calibration]\nsigma_mount_m = -0.1\n", "calibration.sigma_mount_m"),
         ("[filter]\nerror = 'additive'\n[calibration]\n", "filter.error"),
         ("strategy = 'pairwise'\n[calibration]\n", "strategy"),

@@ -11,7 +11,7 @@ pub(crate) use window::fold_blocks;
 use crate::fact::{Boot, EntryId, Noise, NominalState, Quantity};
 use crate::geometry::{Matrix3, Vector2, Vector3};
 use crate::joint::{
-    Distrust, ErrorForm, Joint, ParameterKind, Participant, Surprise, Update, clock_influence,
+    Distrust, ErrorForm, Joint, ParameterKind, Participant, Party, Surprise, Update, clock_influence,
 };
 use crate::measurement::{self, Linearization, Unusable};
 use crate::{BootIndex, LandmarkId, Pose2, RobotId, Sequence, Timestamp};
@@ -195,6 +195,10 @@ fn fold_observation(
     other: Option<&(BootIndex, NominalState)>,
 ) -> Result<Residual, SkipReason> {
     let mut noise = measurement::noise_matrix(&usable(quantity, noise)?);
+    let of_map = !matches!(quantity, Quantity::Robot { .. });
+    if let Some(robot) = joint.distrusted(joint.index(key.id.robot).into_iter(), of_map) {
+        return Err(SkipReason::Distrusted(robot));
+    }
     if let Quantity::Absolute(crate::fact::Absolute::Pose(z)) = quantity
         && (joint.index(key.id.robot).is_none() || joint.is_alone(key.id.robot))
     {
@@ -202,7 +206,7 @@ fn fold_observation(
         return Ok(Residual::without_measurement(Outcome::Placed));
     }
     let taken = taken(joint, key, quantity, observer, other)?;
-    if let Some(robot) = joint.distrusted(robots(&taken), !matches!(quantity, Quantity::Robot { .. })) {
+    if let Some(robot) = joint.distrusted(robots(&taken), of_map) {
         return Err(SkipReason::Distrusted(robot));
     }
     noise *= joint.part(taken[0].0).noise_level;
@@ -229,7 +233,15 @@ fn fold_observation(
     let mut participants = participants(quantity, &taken, &influences, &at);
     let odds = config.clutter.map(|clutter| clutter.log_odds(quantity));
     let (residual, weight) = update(joint, config, &at, &noise, &mut participants, odds)?;
-    reflect(joint, config, key.time, &taken, (residual.dimension, residual.nis, weight), config.join);
+    reflect(
+        joint,
+        config,
+        key.time,
+        quantity,
+        &taken,
+        (residual.dimension, residual.nis, weight),
+        config.join,
+    );
     Ok(residual)
 }
 
@@ -239,6 +251,7 @@ fn reflect(
     joint: &mut Joint,
     config: &FoldConfig,
     time: Timestamp,
+    quantity: &Quantity,
     taken: &[Taken],
     (dimension, nis, weight): (usize, f64, f64),
     detach: bool,
@@ -255,7 +268,7 @@ fn reflect(
         joint.follow(inflation, &robots, &surprise);
     }
     if let Some(quarantine) = &config.quarantine
-        && let Some((robot, whole)) = joint.weigh(quarantine, &robots, &surprise)
+        && let Some((robot, whole)) = joint.weigh(quarantine, &robots, Party::of(quantity), &surprise)
     {
         let distrust = Distrust { since: time, whole };
         if !(detach && whole && joint.detach(robot, time, quarantine.last_chance(time))) {

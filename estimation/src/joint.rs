@@ -13,7 +13,7 @@ pub use component::{Anchor, Component, End, Measured, Tie};
 pub use covariance::JointCovariance;
 pub(crate) use covariance::{Prepared, squared};
 pub(crate) use standing::Surprise;
-pub use standing::{Contradiction, Distrust};
+pub use standing::{Contradiction, Distrust, Party};
 pub(crate) use view::{RobotView, clock_influence};
 
 use crate::fact::NominalState;
@@ -226,6 +226,12 @@ impl Joint {
         member.folded_motion = at.sensitivity.map_or_else(Matrix3::zeros, |sensitivity| sensitivity.motion);
         let known = |block: &Block| matches!(block, Block::Robot(known) if known.robot == robot);
         let index = if let Some(index) = self.blocks.iter().position(known) {
+            if let Block::Robot(Member { boot: of, placed: true, noise_level, detached, .. }) =
+                self.blocks[index]
+                && of == boot
+            {
+                (member.noise_level, member.detached) = (noise_level, detached);
+            }
             self.blocks[index] = Block::Robot(member);
             self.covariance.clear(index);
             index

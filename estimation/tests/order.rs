@@ -4,7 +4,7 @@ mod support;
 
 use pleiad_estimation::RobotId;
 use pleiad_estimation::fact::Entry;
-use pleiad_estimation::fold::{FoldConfig, Relinearization};
+use pleiad_estimation::fold::{FoldConfig, Inflation, Quarantine, Relinearization};
 use pleiad_estimation::joint::ErrorForm;
 use pleiad_estimation::ledger::{Insertion, Ledger};
 use proptest::prelude::*;
@@ -51,13 +51,35 @@ proptest! {
 
     #[test]
     fn any_order_gives_the_same_bits(seed in 0u64..1_000_000, robots in 2u32..=8, all in any::<bool>(),
-                                     additive in any::<bool>(), together in any::<bool>()) {
+                                     additive in any::<bool>(), together in any::<bool>(), wary in any::<bool>()) {
         let form = if additive { ErrorForm::Additive } else { ErrorForm::Invariant };
         let relinearize = together.then_some(TOGETHER);
-        let config = FoldConfig { form, relinearize, ..FoldConfig::default() };
+        // So low that robots are suspected for nothing.
+        let quarantine = wary.then_some(Quarantine { level: 1.0, window_ns: 10_000_000_000 });
+        let inflation = wary.then_some(Inflation { readings: 10.0, most: 5.0 });
+        let config = FoldConfig { form, relinearize, quarantine, inflation, join: wary && !additive, ..FoldConfig::default() };
         let kinds = if all { Kinds::All } else { Kinds::Relative };
         check_order(seed, &Options { robots, seconds: 20, kinds, config, ..Options::default() });
     }
+}
+
+/// Suspects are taken out and not believed in the runs above, not only in name.
+#[test]
+fn robots_are_suspected_where_little_is_needed_for_it() {
+    let quarantine = Some(Quarantine { level: 1.0, window_ns: 10_000_000_000 });
+    let (mut detached, mut whole, mut on_the_map) = (0, 0, 0);
+    for join in [false, true] {
+        let config = FoldConfig { quarantine, join, ..FoldConfig::default() };
+        let options = Options { robots: 5, seconds: 60, config, ..Options::default() };
+        for seed in 0..40 {
+            for member in folded_at_once(&team(seed, &options).entries, config).joint().members() {
+                detached += u32::from(member.detached.is_some());
+                whole += u32::from(member.distrust.is_some_and(|of| of.whole));
+                on_the_map += u32::from(member.distrust.is_some_and(|of| !of.whole));
+            }
+        }
+    }
+    assert!(detached > 5 && whole > 5 && on_the_map > 5, "{detached} {whole} {on_the_map} of 400");
 }
 
 #[test]

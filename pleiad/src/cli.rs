@@ -21,7 +21,9 @@ pub use filter::FilterArgs;
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
 pub use tune::{AlsoArg, TuneArgs};
-pub use values::{AbsoluteArg, CalibrateArg, ClutterArg, LandmarksArg, RelinearizeArg, ToldArg};
+pub use values::{
+    AbsoluteArg, CalibrateArg, ClutterArg, InflateArg, LandmarksArg, QuarantineArg, RelinearizeArg, ToldArg,
+};
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
 #[derive(Debug, Parser)]

@@ -22,6 +22,8 @@ mod json;
 mod models;
 #[path = "command_line/simulate.rs"]
 mod simulate;
+#[path = "command_line/standing.rs"]
+mod standing;
 #[path = "command_line/tune.rs"]
 mod tune;
 

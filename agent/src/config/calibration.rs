@@ -1,7 +1,9 @@
-//! `[calibration]` and `[filter.clutter]`: what the filter is to find out besides poses, and what is not to be believed.
+//! `[calibration]`, `[filter.clutter]`, `[filter.inflation]` and `[filter.quarantine]`: what the filter is to find out besides poses,
+//! and what is not to be believed.
 
+use pleiad_estimation::Timestamp;
 use pleiad_estimation::fact::Calibration;
-use pleiad_estimation::fold::Clutter;
+use pleiad_estimation::fold::{Clutter, Inflation, Quarantine};
 use pleiad_estimation::strategy::StrategyKind;
 use serde::{Deserialize, Serialize};
 
@@ -67,6 +69,50 @@ impl From<ClutterSection> for Clutter {
     }
 }
 
+/// `[filter.inflation]`: levels of noise follow what is read.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct InflationSection {
+    /// Over how many readings of a robot.
+    pub readings: f64,
+    /// Largest factor on its variances.
+    pub most: f64,
+}
+
+impl Default for InflationSection {
+    fn default() -> Self {
+        Self { readings: 20.0, most: 10.0 }
+    }
+}
+
+impl From<InflationSection> for Inflation {
+    fn from(of: InflationSection) -> Self {
+        Self { readings: of.readings, most: of.most }
+    }
+}
+
+/// `[filter.quarantine]`: a robot that contradicts the others is not believed any more.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct QuarantineSection {
+    /// Logarithm of the odds that it takes, nats.
+    pub level: f64,
+    /// Robots that have not measured one another for so long are not compared, s.
+    pub window_s: f64,
+}
+
+impl Default for QuarantineSection {
+    fn default() -> Self {
+        Self { level: 15.0, window_s: 30.0 }
+    }
+}
+
+impl From<QuarantineSection> for Quarantine {
+    fn from(of: QuarantineSection) -> Self {
+        Self { level: of.level, window_ns: Timestamp::from_seconds(of.window_s).0 }
+    }
+}
+
 impl AgentConfig {
     /// What is to be calibrated; only facts can tell, and only in the invariant form.
     pub(super) fn calibration(&self) -> Result<Option<Calibration>, ConfigError> {
@@ -85,7 +131,31 @@ impl AgentConfig {
             ));
         }
         positive("filter.clutter.reach_m", clutter.reach_m)?;
-        if self.strategy == StrategyKind::Exact { Ok(()) } else { self.needs_facts("filter.clutter") }
+        self.needs_exact("filter.clutter")
+    }
+
+    pub(super) fn check_standing(&self) -> Result<(), ConfigError> {
+        if let Some(inflation) = &self.filter.inflation {
+            self.needs_exact("filter.inflation")?;
+            let readings = inflation.readings;
+            if !(readings >= 1.0 && readings.is_finite()) {
+                return Err(value("filter.inflation.readings", readings, "1 or more"));
+            }
+            if !(inflation.most > 1.0 && inflation.most.is_finite()) {
+                let expected = "more than 1; without inflation remove the table";
+                return Err(value("filter.inflation.most", inflation.most, expected));
+            }
+        }
+        if let Some(quarantine) = &self.filter.quarantine {
+            self.needs_exact("filter.quarantine")?;
+            positive("filter.quarantine.level", quarantine.level)?;
+            positive("filter.quarantine.window_s", quarantine.window_s)?;
+        }
+        Ok(())
+    }
+
+    fn needs_exact(&self, beside: &'static str) -> Result<(), ConfigError> {
+        if self.strategy == StrategyKind::Exact { Ok(()) } else { self.needs_facts(beside) }
     }
 
     /// What only the exact strategy with the invariant error has.

@@ -7,7 +7,7 @@ use pleiad_estimation::fold::{DEFAULT_GATE, FoldConfig, Relinearization};
 use pleiad_estimation::joint::ErrorForm;
 use serde::{Deserialize, Serialize};
 
-use super::calibration::ClutterSection;
+use super::calibration::{ClutterSection, InflationSection, QuarantineSection};
 use super::noises::{AngleNoise, LengthNoise, PoseNoise, RangeBearingNoise, RangeNoise};
 
 /// The error of a pose, as written in a configuration.
@@ -34,6 +34,12 @@ pub struct FilterSection {
     /// Some observations are of nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clutter: Option<ClutterSection>,
+    /// Levels of noise follow what is read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inflation: Option<InflationSection>,
+    /// A robot that contradicts the others is not believed any more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quarantine: Option<QuarantineSection>,
     /// Facts are linearized together, not each where those before it put the robots.
     pub relinearize: Option<RelinearizeSection>,
 }
@@ -62,6 +68,8 @@ impl Default for FilterSection {
             error: ErrorName::Invariant,
             gate: DEFAULT_GATE,
             clutter: None,
+            inflation: None,
+            quarantine: None,
             join: false,
             relinearize: None,
         }
@@ -86,6 +94,8 @@ impl FilterSection {
             form,
             gate: self.gate,
             clutter: self.clutter.map(Into::into),
+            inflation: self.inflation.map(Into::into),
+            quarantine: self.quarantine.map(Into::into),
             join: self.join,
             relinearize,
         }

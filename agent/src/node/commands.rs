@@ -1,6 +1,7 @@
 //! What goes into a node and what comes out.
 
 use pleiad_estimation::fact::{Entry, EntryId, Fingerprint, LogId, NominalState};
+use pleiad_estimation::joint::{Joint, Member};
 use pleiad_estimation::ledger::{Checkpoint, EarlierEntries, Refusal};
 use pleiad_estimation::sample::{Sample, SampleRefusal};
 use pleiad_estimation::strategy;
@@ -229,4 +230,48 @@ pub enum Notice {
         /// The boot.
         boot: BootIndex,
     },
+    /// A robot is believed less, or more again. As long as facts can come late, this can change.
+    #[error("robot {robot}: {standing}")]
+    Standing {
+        /// Which.
+        robot: RobotId,
+        /// How far it is believed now.
+        standing: Standing,
+    },
+}
+
+/// How far a robot is believed (`[filter.quarantine]`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Standing {
+    /// In everything.
+    #[error("contradicts nobody any more")]
+    Sound,
+    /// It is in a frame of its own until what is seen agrees on where it is.
+    #[error(
+        "contradicts the others: it was lost, or does not say what is; it is placed anew once what is seen agrees"
+    )]
+    Detached,
+    /// Not on where it is in the map.
+    #[error(
+        "contradicts the map alone: its fixes and landmarks are not used until it starts again; look at its receiver"
+    )]
+    NotOnTheMap,
+    /// Not at all.
+    #[error(
+        "contradicts the others: nothing that it says is used until it starts again; look at its sensors, odometry, \
+         and who sends in its name"
+    )]
+    Distrusted,
+}
+
+impl Standing {
+    /// Of a member.
+    pub(super) fn of(joint: &Joint, member: &Member) -> Self {
+        match member.distrust {
+            Some(distrust) if distrust.whole => Self::Distrusted,
+            Some(_) => Self::NotOnTheMap,
+            None if member.detached.is_some() && !joint.is_in_map(member.robot) => Self::Detached,
+            None => Self::Sound,
+        }
+    }
 }

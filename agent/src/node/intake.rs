@@ -113,6 +113,7 @@ impl Node {
             return;
         }
         self.next_estimate = Some(cell + 1);
+        self.tell_standings();
         if let Some(estimate) = self.estimate() {
             self.out.rest.push(Command::Estimate(estimate));
         }

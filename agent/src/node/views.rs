@@ -1,15 +1,16 @@
 //! What can be asked of a node: its estimate, its settled history, its status.
 
-use pleiad_estimation::Timestamp;
+use std::collections::BTreeMap;
+
 use pleiad_estimation::fact::NominalState;
 use pleiad_estimation::ledger::FactCounts;
 use pleiad_estimation::sample::SampleRefusal;
 use pleiad_estimation::symmetric::Symmetric3;
-use pleiad_estimation::{BootIndex, Pose2};
+use pleiad_estimation::{BootIndex, Pose2, RobotId, Timestamp};
 use pleiad_protocol::{Estimate, LogStatus, SampleCounts, Status};
 
-use super::Node;
 use super::segments::Segment;
+use super::{Node, Notice, Standing};
 use crate::results::Found;
 
 /// One point of a settled trajectory: the estimate at a time on all facts up to it.
@@ -149,6 +150,23 @@ impl Node {
     /// Why the sample refused last was refused. Notices are given for the first of a reason only.
     pub fn last_refusal(&self) -> Option<SampleRefusal> {
         self.counts.last
+    }
+
+    /// Tells of robots that are believed less, or more, than was told last.
+    pub(super) fn tell_standings(&mut self) {
+        if self.config.fold.quarantine.is_none() {
+            return;
+        }
+        let joint = self.ledger.settle();
+        let now: BTreeMap<RobotId, Standing> =
+            joint.members().map(|member| (member.robot, Standing::of(joint, member))).collect();
+        let last = |robot: &RobotId| self.standings.get(robot).copied().unwrap_or(Standing::Sound);
+        let changed: Vec<_> = now.iter().filter(|(robot, standing)| last(robot) != **standing).collect();
+        let changed: Vec<_> = changed.into_iter().map(|(robot, standing)| (*robot, *standing)).collect();
+        self.standings = now;
+        for (robot, standing) in changed {
+            self.notice(Notice::Standing { robot, standing });
+        }
     }
 
     /// What was found out besides poses.

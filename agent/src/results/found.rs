@@ -1,7 +1,8 @@
 //! What the filter found out besides poses.
 
+use pleiad_estimation::Timestamp;
 use pleiad_estimation::geometry::Matrix3;
-use pleiad_estimation::joint::{Block, Joint, ParameterKind};
+use pleiad_estimation::joint::{Block, Joint, Member, ParameterKind};
 use serde::{Deserialize, Serialize};
 
 /// Parameters and landmarks, as the whole team knows them.
@@ -11,6 +12,42 @@ pub struct Found {
     pub parameters: Vec<FoundParameter>,
     /// Landmarks whose places nobody knew, in the order of their numbers.
     pub landmarks: Vec<FoundLandmark>,
+    /// Robots of which more is known than where they are: those whose noise is more than stated, or that contradicted others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub robots: Vec<FoundRobot>,
+}
+
+/// How far a robot is believed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FoundRobot {
+    /// Which.
+    pub robot: u32,
+    /// How many times its variances are what it states.
+    pub noise_level: f64,
+    /// When it was last taken out of the frame that it contradicted, s; it was lost, or lied.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub detached_s: Option<f64>,
+    /// Since when it is not believed, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distrusted_s: Option<f64>,
+    /// It is not believed only on where it is in the map: fixes and known landmarks.
+    #[serde(default)]
+    pub on_the_map_only: bool,
+}
+
+impl FoundRobot {
+    /// What is known of a member, if there is anything.
+    pub fn of(member: &Member) -> Option<Self> {
+        let Member { robot, noise_level, detached, distrust, .. } = *member;
+        let plain = noise_level == 1.0 && detached.is_none() && distrust.is_none();
+        (!plain).then(|| Self {
+            robot: robot.0,
+            noise_level,
+            detached_s: detached.map(Timestamp::seconds),
+            distrusted_s: distrust.map(|distrust| distrust.since.seconds()),
+            on_the_map_only: distrust.is_some_and(|distrust| !distrust.whole),
+        })
+    }
 }
 
 /// One parameter of a robot.
@@ -86,11 +123,13 @@ impl Found {
                         sigma_y_m: spread[(1, 1)].max(0.0).sqrt(),
                     });
                 }
-                Block::Robot(_) | Block::Anchor(_) | Block::Free => {}
+                Block::Robot(member) => found.robots.extend(FoundRobot::of(member)),
+                Block::Anchor(_) | Block::Free => {}
             }
         }
         found.parameters.sort_by_key(|parameter| parameter.robot);
         found.landmarks.sort_by_key(|landmark| landmark.id);
+        found.robots.sort_by_key(|robot| robot.robot);
         found
     }
 }

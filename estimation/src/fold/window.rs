@@ -289,6 +289,7 @@ impl Pass {
                 &mut self.joint,
                 config,
                 event.time,
+                event.quantity,
                 &event.participants,
                 (dimension, nis, weight),
                 false,

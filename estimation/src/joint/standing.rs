@@ -3,24 +3,61 @@
 use std::collections::BTreeMap;
 
 use super::{Block, Component, ErrorForm, Joint};
+use crate::fact::Quantity;
 use crate::fold::{Inflation, Quarantine};
-use crate::{RobotId, Timestamp};
+use crate::{LandmarkId, RobotId, Timestamp};
 
 /// What speaks for readings between two being wrong, by what one of them measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contradiction {
     /// Who measured.
     pub author: RobotId,
-    /// Whom; `None` is the map: a landmark or a fix.
-    pub of: Option<RobotId>,
+    /// What it measured.
+    pub of: Party,
     /// Logarithm of the odds that they are wrong since it was last zero, nats.
     pub level: f64,
     /// How many readings there were, each forgotten over the next [`MEMORY`].
     pub readings: f64,
     /// How many of them surprised.
     pub surprises: f64,
-    /// When it measured last.
+    /// When the last one that counted was.
     pub last: Timestamp,
+}
+
+/// What can be wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Party {
+    /// A robot.
+    Robot(RobotId),
+    /// Where a landmark is.
+    Landmark(LandmarkId),
+    /// The map as fixes know it.
+    Map,
+}
+
+impl Party {
+    /// What a reading is of.
+    pub(crate) fn of(quantity: &Quantity) -> Self {
+        match quantity {
+            Quantity::Robot { robot, .. } => Self::Robot(*robot),
+            Quantity::Landmark { landmark, .. } | Quantity::Feature { landmark, .. } => {
+                Self::Landmark(*landmark)
+            }
+            Quantity::Absolute(_) => Self::Map,
+        }
+    }
+
+    fn is_robot(self) -> bool {
+        matches!(self, Self::Robot(_))
+    }
+
+    fn words(self) -> [u64; 2] {
+        match self {
+            Self::Robot(robot) => [0, u64::from(robot.0)],
+            Self::Landmark(landmark) => [1, u64::from(landmark.0)],
+            Self::Map => [2, 0],
+        }
+    }
 }
 
 /// How much a robot's word is worth.
@@ -43,6 +80,8 @@ const PRIOR: f64 = 20.0;
 const WRONG: f64 = 0.7;
 /// After so many readings of a kind one is forgotten but for a third.
 const MEMORY: f64 = 64.0;
+/// Readings of a pair closer to each other are of one look, ns, and count as one: what is wrong with one is wrong with all.
+const LOOK_NS: i64 = 1_000_000_000;
 /// A level grows up to so many times that which counts, so that what was wrong for an hour can be right within seconds.
 const CAP: f64 = 2.0;
 /// From here on two contradict each other, nats: one surprise where they are rare.
@@ -68,15 +107,15 @@ fn counted(level: f64, surprises: bool, sound: f64, most: f64) -> f64 {
 }
 
 impl Contradiction {
-    pub(super) fn words(&self) -> [u64; 6] {
-        let of = self.of.map_or(u64::MAX, |robot| u64::from(robot.0));
+    pub(super) fn words(&self) -> [u64; 7] {
+        let [kind, of] = self.of.words();
         let [level, readings, surprises] = [self.level, self.readings, self.surprises].map(f64::to_bits);
-        [u64::from(self.author.0), of, level, readings, surprises, self.last.0.cast_unsigned()]
+        [u64::from(self.author.0), kind, of, level, readings, surprises, self.last.0.cast_unsigned()]
     }
 
-    /// Who it is between, in their order; the map is first.
-    fn ends(&self) -> [Option<RobotId>; 2] {
-        let ends = [Some(self.author), self.of];
+    /// Who it is between, in their order; robots are first.
+    fn ends(&self) -> [Party; 2] {
+        let ends = [Party::Robot(self.author), self.of];
         [ends[0].min(ends[1]), ends[0].max(ends[1])]
     }
 }
@@ -117,10 +156,14 @@ impl Joint {
         &mut self,
         quarantine: &Quarantine,
         robots: &[usize],
+        partner: Party,
         of: &Surprise,
     ) -> Option<(RobotId, bool)> {
         let author = self.part(*robots.first()?).robot;
-        let partner = robots.get(1).map(|index| self.part(*index).robot);
+        let place = self.contradictions.binary_search_by_key(&(author, partner), |of| (of.author, of.of));
+        if place.is_ok_and(|at| of.time.0 < self.contradictions[at].last.0.saturating_add(LOOK_NS)) {
+            return None;
+        }
         let most = CAP * quarantine.level;
         let surprises = of.nis > SURPRISE[of.dimension - 1];
         let [sound, without_author, without_partner] =
@@ -129,7 +172,6 @@ impl Joint {
             let doubt = &mut self.part_mut(*index).doubt[side];
             *doubt = counted(*doubt, surprises, sound, most);
         }
-        let place = self.contradictions.binary_search_by_key(&(author, partner), |of| (of.author, of.of));
         let place = place.unwrap_or_else(|at| {
             let last = of.time;
             let fresh =
@@ -181,7 +223,7 @@ impl Joint {
     /// they contradict each other for a while.
     fn acquit(&mut self, robot: RobotId, whole: bool) {
         if !whole {
-            self.contradictions.retain(|of| of.ends() != [None, Some(robot)]);
+            self.contradictions.retain(|of| of.author != robot || of.of.is_robot());
             return;
         }
         self.contradictions.clear();
@@ -197,16 +239,17 @@ impl Joint {
     fn shares_between_others(
         &self,
         author: RobotId,
-        partner: Option<RobotId>,
+        partner: Party,
         of: &Surprise,
         quarantine: &Quarantine,
     ) -> [f64; 3] {
         let least = SOUND + of.nothing * (1.0 - SOUND);
         let mut counts = [(PRIOR, PRIOR * least); 3];
-        let same_kind = |of: &&Contradiction| of.of.is_some() == partner.is_some();
+        let same_kind = |of: &&Contradiction| of.of.is_robot() == partner.is_robot();
         for of in self.fresh(of.time, quarantine).filter(same_kind) {
-            let is = |robot: Option<RobotId>| robot.is_some() && of.ends().contains(&robot);
-            let of_either = [is(Some(author)), is(partner)];
+            // Everyone has a part of the map; only what is of the other robot is left out.
+            let is = |party: Party| of.ends().contains(&party);
+            let of_either = [is(Party::Robot(author)), partner.is_robot() && is(partner)];
             let counted = [!of_either[0] && !of_either[1], !of_either[0], !of_either[1]];
             for ((readings, surprises), _) in counts.iter_mut().zip(counted).filter(|(_, counted)| *counted) {
                 *readings += of.readings;
@@ -228,11 +271,11 @@ impl Joint {
     /// that by as much, and two others at least, and more than half of those who are compared with it, do not.
     fn explains(&self, quarantine: &Quarantine, now: Timestamp) -> Option<(RobotId, bool)> {
         // Both ways between two are one comparison.
-        let mut between: BTreeMap<[Option<RobotId>; 2], f64> = BTreeMap::new();
+        let mut between: BTreeMap<[Party; 2], f64> = BTreeMap::new();
         for of in self.fresh(now, quarantine) {
             *between.entry(of.ends()).or_default() += of.level;
         }
-        let mut suspects: BTreeMap<Option<RobotId>, Suspect> = BTreeMap::new();
+        let mut suspects: BTreeMap<Party, Suspect> = BTreeMap::new();
         for (ends, level) in &between {
             for end in ends {
                 let suspect = suspects.entry(*end).or_default();
@@ -245,22 +288,38 @@ impl Joint {
         let others = suspects.iter().filter(|(other, _)| *other != liar).map(|(_, other)| other.level);
         let second = others.fold(0.0, f64::max);
         let many = first.contradicted >= 2 && 2 * first.contradicted > first.compared;
-        let doubted =
-            |robot| self.member(robot).is_some_and(|of| of.doubt[0] + of.doubt[1] >= quarantine.level);
-        if many && first.level - second >= 0.5 * quarantine.level && liar.is_some_and(doubted) {
-            return liar.map(|robot| (robot, true));
+        if let Party::Robot(robot) = liar
+            && many
+            && first.level - second >= 0.5 * quarantine.level
+            && self.member(*robot).is_some_and(|of| of.doubt[0] + of.doubt[1] >= quarantine.level)
+        {
+            return Some((*robot, true));
         }
-        let map = suspects.get(&None)?;
-        let sound = map.compared - map.contradicted;
-        let of_map = between.iter().filter(|([end, _], _)| end.is_none());
-        let ([_, robot], level) = of_map.max_by(|a, b| a.1.total_cmp(b.1))?;
-        let alone = *level >= quarantine.level && sound >= 2 && 2 * sound > map.compared;
-        robot.filter(|_| alone).map(|robot| (robot, false))
+        // Of what others agree with: how much speaks against each robot's word on it, and on how many parts of the map.
+        let mut on_the_map: BTreeMap<RobotId, (f64, usize)> = BTreeMap::new();
+        for ([robot, party], level) in &between {
+            let Some(suspect) = suspects.get(party) else { continue };
+            let sound = suspect.compared - suspect.contradicted;
+            if let (Party::Robot(robot), false) = (robot, party.is_robot())
+                && *level >= CONTRADICTS
+                && sound >= 2
+                && 2 * sound > suspect.compared
+            {
+                let (sum, parts) = on_the_map.entry(*robot).or_default();
+                *sum += level;
+                // One landmark may be taken for another, for as long as it is in sight.
+                *parts += if *party == Party::Map { 2 } else { 1 };
+            }
+        }
+        let worst = on_the_map.into_iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        worst
+            .filter(|(_, (sum, parts))| *sum >= quarantine.level && *parts >= 2)
+            .map(|(robot, _)| (robot, false))
     }
 
     /// Forgets what contradicts a robot, which begins anew.
     pub(super) fn absolve(&mut self, robot: RobotId) {
-        self.contradictions.retain(|of| !of.ends().contains(&Some(robot)));
+        self.contradictions.retain(|of| !of.ends().contains(&Party::Robot(robot)));
     }
 }
 

@@ -5,7 +5,7 @@ use pleiad_agent::config::{ErrorName, FilterSection};
 use pleiad_estimation::RobotId;
 use pleiad_estimation::strategy::StrategyKind;
 
-use super::{CalibrateArg, ClutterArg, ErrorArg, RelinearizeArg, ToldArg};
+use super::{CalibrateArg, ClutterArg, ErrorArg, InflateArg, QuarantineArg, RelinearizeArg, ToldArg};
 
 #[derive(Clone, Debug, Args)]
 pub struct FilterArgs {
@@ -22,6 +22,14 @@ pub struct FilterArgs {
     /// So large a share of observations is of nothing, seen up to so far away: each is weighed by its probability.
     #[arg(long, value_name = "SHARE:REACH_M")]
     pub clutter: Option<ClutterArg>,
+    /// Raise stated noise where readings surprise, over so many readings of a robot, by at most such a factor on its
+    /// variances, as in 20:10.
+    #[arg(long, value_name = "READINGS:MOST")]
+    pub inflate: Option<InflateArg>,
+    /// Do not believe a robot that contradicts the others: logarithm of the odds that it takes, and for how long robots are
+    /// compared after they measured one another, s, as in 15:30.
+    #[arg(long, value_name = "LEVEL:WINDOW_S")]
+    pub quarantine: Option<QuarantineArg>,
     /// What is not sure about the robots and is to be found out, by standard deviations: forward and yaw (scales of the odometry),
     /// bias (yaw rate, rad/s), mount_m and mount_rad (the sensor of others), clock (s) and
     /// drift_ppm (of all robots but the first).
@@ -40,6 +48,8 @@ impl FilterArgs {
             error,
             relinearize: None,
             clutter: None,
+            inflate: None,
+            quarantine: None,
             calibrate: None,
             told: ToldArg::All,
         }
@@ -62,6 +72,8 @@ impl FilterArgs {
         let relinearize = self.relinearize.map(|how| how.0).or(filter.relinearize);
         let clutter = self.clutter.map(|clutter| clutter.0).or(filter.clutter);
         let join = filter.join || self.told != ToldArg::All;
-        FilterSection { error, gate: filter.gate, clutter, join, relinearize }
+        let inflation = self.inflate.map(|inflation| inflation.0).or(filter.inflation);
+        let quarantine = self.quarantine.map(|quarantine| quarantine.0).or(filter.quarantine);
+        FilterSection { error, gate: filter.gate, clutter, inflation, quarantine, join, relinearize }
     }
 }

@@ -2,7 +2,9 @@
 
 use std::str::FromStr;
 
-use pleiad_agent::config::{CalibrationSection, ClutterSection, RelinearizeSection};
+use pleiad_agent::config::{
+    CalibrationSection, ClutterSection, InflationSection, QuarantineSection, RelinearizeSection,
+};
 use pleiad_estimation::{LandmarkId, RobotId};
 
 /// `known`, `none`, `team`, or a list of numbers.
@@ -84,10 +86,40 @@ impl FromStr for ClutterArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parsed = text.split_once(':').and_then(|(share, reach)| {
-            Some(Self(ClutterSection { share: share.parse().ok()?, reach_m: reach.parse().ok()? }))
-        });
-        parsed.ok_or_else(|| format!("found {text:?}, expected SHARE:REACH_M as in 0.05:10"))
+        let [share, reach_m] = two(text, "SHARE:REACH_M as in 0.05:10")?;
+        Ok(Self(ClutterSection { share, reach_m }))
+    }
+}
+
+/// Two numbers with a colon between them.
+fn two(text: &str, expected: &str) -> Result<[f64; 2], String> {
+    let parsed = text.split_once(':').and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
+    parsed.ok_or_else(|| format!("found {text:?}, expected {expected}"))
+}
+
+/// `READINGS:MOST`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InflateArg(pub InflationSection);
+
+impl FromStr for InflateArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let [readings, most] = two(text, "READINGS:MOST as in 20:10")?;
+        Ok(Self(InflationSection { readings, most }))
+    }
+}
+
+/// `LEVEL:WINDOW_S`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuarantineArg(pub QuarantineSection);
+
+impl FromStr for QuarantineArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let [level, window_s] = two(text, "LEVEL:WINDOW_S as in 15:30")?;
+        Ok(Self(QuarantineSection { level, window_s }))
     }
 }
 

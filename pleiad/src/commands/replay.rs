@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use pleiad_agent::SettledEstimate;
-use pleiad_agent::results::{AgentSummary, Found, FoundLandmark, FoundParameter};
+use pleiad_agent::results::{AgentSummary, Found, FoundLandmark, FoundParameter, FoundRobot};
 use pleiad_estimation::{LandmarkId, Timestamp};
 use pleiad_recording::{IngestReport, ReadOptions, Recording, tum};
 use pleiad_report::{ReplayReport, RobotScore, replay_report, run_report, write_summary};
@@ -60,6 +60,9 @@ pub struct FoundJson {
     pub landmarks: Vec<FoundLandmark>,
     /// Root mean square of the distances of the landmarks from where the recording says that they are.
     pub landmark_rmse_m: Option<f64>,
+    /// Robots whose noise is more than stated, or that are not believed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub robots: Vec<FoundRobot>,
 }
 
 #[derive(Debug, Serialize)]
@@ -245,6 +248,7 @@ fn found(recording: &Recording, result: &RunResult) -> Option<FoundJson> {
         parameters: found.parameters.clone(),
         landmarks: found.landmarks.clone(),
         landmark_rmse_m: mean.map(f64::sqrt),
+        robots: found.robots.clone(),
     })
 }
 

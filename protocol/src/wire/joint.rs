@@ -3,7 +3,7 @@
 use pleiad_estimation::geometry::Matrix3;
 use pleiad_estimation::joint::{
     Anchor, Block, Component, Contradiction, Distrust, End, MappedLandmark, Measured, Member, ParameterKind,
-    Parameters, Tie,
+    Parameters, Party, Tie,
 };
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, LandmarkId, RobotId, Timestamp};
@@ -183,12 +183,18 @@ impl TryFrom<WireTie> for Tie {
 #[derive(Serialize, Deserialize)]
 pub(super) struct WireContradiction {
     author: u32,
-    /// None is the map.
-    of: Option<u32>,
+    of: WireParty,
     level: f64,
     readings: f64,
     surprises: f64,
     last_ns: i64,
+}
+
+#[derive(Serialize, Deserialize)]
+enum WireParty {
+    Robot(u32),
+    Landmark(u32),
+    Map,
 }
 
 impl TryFrom<WireContradiction> for Contradiction {
@@ -197,7 +203,11 @@ impl TryFrom<WireContradiction> for Contradiction {
     fn try_from(wire: WireContradiction) -> Result<Self, ProtocolError> {
         Ok(Self {
             author: RobotId(wire.author),
-            of: wire.of.map(RobotId),
+            of: match wire.of {
+                WireParty::Robot(robot) => Party::Robot(RobotId(robot)),
+                WireParty::Landmark(landmark) => Party::Landmark(LandmarkId(landmark)),
+                WireParty::Map => Party::Map,
+            },
             level: check::number("contradiction.level", wire.level)?,
             readings: check::number("contradiction.readings", wire.readings)?,
             surprises: check::number("contradiction.surprises", wire.surprises)?,
@@ -208,8 +218,12 @@ impl TryFrom<WireContradiction> for Contradiction {
 
 pub(super) fn wire_contradiction(of: &Contradiction) -> WireContradiction {
     let Contradiction { author, of, level, readings, surprises, last } = *of;
-    let (author, of) = (author.0, of.map(|robot| robot.0));
-    WireContradiction { author, of, level, readings, surprises, last_ns: last.0 }
+    let of = match of {
+        Party::Robot(robot) => WireParty::Robot(robot.0),
+        Party::Landmark(landmark) => WireParty::Landmark(landmark.0),
+        Party::Map => WireParty::Map,
+    };
+    WireContradiction { author: author.0, of, level, readings, surprises, last_ns: last.0 }
 }
 
 pub(super) fn wire_tie(tie: &Tie) -> WireTie {

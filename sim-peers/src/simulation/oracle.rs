@@ -18,7 +18,8 @@ const ROUNDINGS: f64 = 4.0;
 /// Whether a ledger believes what the oracle does, or what is off.
 pub fn agrees(joint: &Joint, facts: &[ReferenceFact], fold: &FoldConfig) -> Result<(), String> {
     let parameters = |block: &Block| !matches!(block, Block::Robot(_));
-    if fold.relinearize.is_some() || fold.clutter.is_some() || joint.blocks().iter().any(parameters) {
+    let more = fold.clutter.is_some() || fold.inflation.is_some() || fold.quarantine.is_some();
+    if fold.relinearize.is_some() || more || joint.blocks().iter().any(parameters) {
         return at_once(joint, &folded(facts, fold));
     }
     let form = match fold.form {

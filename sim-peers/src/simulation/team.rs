@@ -37,6 +37,8 @@ pub fn config(plan: &Plan, robot: u32, start: &Pose2) -> Result<NodeConfig, Stri
     if plan.calibrate {
         filter.push_str("join = true\n");
         filter.push_str("clutter = { share = 0.05, reach_m = 30.0 }\n");
+        // Low enough that robots are found to contradict each other every now and then.
+        filter.push_str("inflation = {}\nquarantine = { level = 1.0 }\n");
         filter.push_str("[calibration]\nsigma_forward_scale = 0.05\nsigma_yaw_scale = 0.05\n");
         filter.push_str("sigma_mount_m = 0.05\nsigma_mount_rad = 0.02\nsigma_clock_offset_s = 0.02\n");
         (landmarks, unknown) = ("", "unknown_landmarks = 'map'\n");
