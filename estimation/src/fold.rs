@@ -209,7 +209,7 @@ fn fold_observation(
     if let Some(robot) = joint.distrusted(robots(&taken), of_map) {
         return Err(SkipReason::Distrusted(robot));
     }
-    noise *= joint.part(taken[0].0).noise_level;
+    noise *= joint.part(taken[0].0).reputation.noise_level;
     for (index, state) in &taken {
         if let Some(state) = state {
             joint.propagate(*index, state);
@@ -233,20 +233,12 @@ fn fold_observation(
     let mut participants = participants(quantity, &taken, &influences, &at);
     let odds = config.clutter.map(|clutter| clutter.log_odds(quantity));
     let (residual, weight) = update(joint, config, &at, &noise, &mut participants, odds)?;
-    reflect(
-        joint,
-        config,
-        key.time,
-        quantity,
-        &taken,
-        (residual.dimension, residual.nis, weight),
-        config.join,
-    );
+    reflect(joint, config, key.time, quantity, &taken, (residual.dimension, residual.nis, weight), true);
     Ok(residual)
 }
 
 /// What a reading says of those who took part, besides where they are, by its dimension, its normalized innovation squared and
-/// the probability that it is of something. With `detach` a robot that contradicts the others may begin a frame of its own.
+/// the probability that it is of something. With `detach` a robot that contradicts the others begins a frame of its own.
 fn reflect(
     joint: &mut Joint,
     config: &FoldConfig,

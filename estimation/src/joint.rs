@@ -13,7 +13,7 @@ pub use component::{Anchor, Component, End, Measured, Tie};
 pub use covariance::JointCovariance;
 pub(crate) use covariance::{Prepared, squared};
 pub(crate) use standing::Surprise;
-pub use standing::{Contradiction, Distrust, Party};
+pub use standing::{Contradiction, Distrust, Party, Reputation};
 pub(crate) use view::{RobotView, clock_influence};
 
 use crate::fact::NominalState;
@@ -226,17 +226,16 @@ impl Joint {
         member.folded_motion = at.sensitivity.map_or_else(Matrix3::zeros, |sensitivity| sensitivity.motion);
         let known = |block: &Block| matches!(block, Block::Robot(known) if known.robot == robot);
         let index = if let Some(index) = self.blocks.iter().position(known) {
-            if let Block::Robot(Member { boot: of, placed: true, noise_level, detached, .. }) =
-                self.blocks[index]
+            if let Block::Robot(Member { boot: of, placed: true, reputation, .. }) = self.blocks[index]
                 && of == boot
             {
-                (member.noise_level, member.detached) = (noise_level, detached);
+                member.reputation = reputation;
             }
             self.blocks[index] = Block::Robot(member);
             self.covariance.clear(index);
             index
         } else {
-            self.add(Block::Robot(member))
+            self.add(&Block::Robot(member))
         };
         let adjoint = z.adjoint();
         let mut block = adjoint * noise * adjoint.transpose();
@@ -259,13 +258,13 @@ impl Joint {
         self.covariance.couple(i, m, a);
     }
 
-    fn add(&mut self, block: Block) -> usize {
+    fn add(&mut self, block: &Block) -> usize {
         let free = self.blocks.iter().position(|block| *block == Block::Free);
         if let Some(index) = free {
-            self.blocks[index] = block;
+            self.blocks[index] = *block;
             return index;
         }
-        self.blocks.push(block);
+        self.blocks.push(*block);
         self.covariance.grow();
         self.blocks.len() - 1
     }
@@ -275,10 +274,11 @@ impl Joint {
     pub(crate) fn propagate(&mut self, index: usize, state: &NominalState) {
         self.move_by_parameters(index, state);
         let member = self.part(index);
-        let mut added = state.noise_sum.minus(member.folded_noise).congruence(&member.correction.adjoint());
-        if member.noise_level != 1.0 {
-            added = added.scaled(member.noise_level);
-        }
+        let mut added = state
+            .noise_sum
+            .minus(member.folded_noise)
+            .congruence(&member.correction.adjoint())
+            .scaled(member.reputation.noise_level);
         if self.form == ErrorForm::Additive {
             let pose = member.correction.compose(&state.nominal);
             let last = member.correction.compose(&member.nominal);
@@ -361,7 +361,7 @@ impl Joint {
     ) {
         let pose = from.compose(&Pose2::new(position.x, position.y, 0.0));
         let component = self.component(observer).unwrap_or(Component::MAP);
-        let index = self.add(Block::Landmark(MappedLandmark { landmark, pose, component }));
+        let index = self.add(&Block::Landmark(MappedLandmark { landmark, pose, component }));
         self.covariance.couple(index, observer, &Matrix3::identity());
         if let Some((mount, by)) = mount {
             self.covariance.couple(index, mount, &by);

@@ -68,18 +68,18 @@ proptest! {
 fn robots_are_suspected_where_little_is_needed_for_it() {
     let quarantine = Some(Quarantine { level: 1.0, window_ns: 10_000_000_000 });
     let (mut detached, mut whole, mut on_the_map) = (0, 0, 0);
-    for join in [false, true] {
-        let config = FoldConfig { quarantine, join, ..FoldConfig::default() };
+    for form in [ErrorForm::Invariant, ErrorForm::Additive] {
+        let config = FoldConfig { form, quarantine, ..FoldConfig::default() };
         let options = Options { robots: 5, seconds: 60, config, ..Options::default() };
-        for seed in 0..40 {
+        for seed in 0..100 {
             for member in folded_at_once(&team(seed, &options).entries, config).joint().members() {
-                detached += u32::from(member.detached.is_some());
-                whole += u32::from(member.distrust.is_some_and(|of| of.whole));
-                on_the_map += u32::from(member.distrust.is_some_and(|of| !of.whole));
+                detached += u32::from(member.reputation.detached.is_some());
+                whole += u32::from(member.reputation.distrust.is_some_and(|of| of.whole));
+                on_the_map += u32::from(member.reputation.distrust.is_some_and(|of| !of.whole));
             }
         }
     }
-    assert!(detached > 5 && whole > 5 && on_the_map > 5, "{detached} {whole} {on_the_map} of 400");
+    assert!(detached > 5 && whole > 5 && on_the_map > 5, "{detached} {whole} {on_the_map} of 1000");
 }
 
 #[test]

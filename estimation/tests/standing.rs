@@ -7,7 +7,7 @@
 mod support;
 
 use pleiad_estimation::fold::{Clutter, FoldConfig, Inflation, Quarantine, Relinearization};
-use pleiad_estimation::joint::{Distrust, Joint};
+use pleiad_estimation::joint::Joint;
 use pleiad_estimation::{RobotId, Timestamp};
 use support::wander::{Lie, Run, TICK_NS, TICK_S, World, Wrong, run};
 
@@ -35,10 +35,12 @@ fn ten() -> World<'static> {
     World { all_gps: true, every: 1, ..World::default() }
 }
 
-/// The robots that are not believed any more, after how many seconds from when one lies, and whether in whole.
+/// The robots that were found to contradict the others, after how many seconds from when one lies, and whether in whole.
 fn distrusted(joint: &Joint) -> Vec<(u32, f64, bool)> {
     let of = |robot: &pleiad_estimation::joint::Member| {
-        let Distrust { since, whole } = robot.distrust?;
+        let since = robot.reputation.detached.or(robot.reputation.distrust.map(|of| of.since))?;
+        let whole =
+            robot.reputation.detached.is_some() || robot.reputation.distrust.is_some_and(|of| of.whole);
         Some((robot.robot.0, since.0 as f64 / 1e9 - SINCE as f64 * TICK_S, whole))
     };
     joint.members().filter_map(of).collect()
@@ -55,10 +57,6 @@ fn lies(robot: usize) -> [(&'static str, Lie); 3] {
         ("sighting", Lie { sighting: [0.3, 0.1], ..honest }),
         ("answer", Lie { answer_m: 1.0, ..honest }),
     ]
-}
-
-fn outside(joint: &Joint) -> usize {
-    joint.members().filter(|member| !joint.is_in_map(member.robot)).count()
 }
 
 fn nees_of_positions(team: &Run, joint: &Joint) -> f64 {
@@ -150,7 +148,7 @@ fn the_honest_are_nearly_where_they_would_be_without_the_liar() {
 /// A robot that is shoved contradicts the others as a liar does. In a frame of its own it finds back.
 #[test]
 fn a_robot_that_was_carried_off_finds_back() {
-    let wary = FoldConfig { join: true, ..wary() };
+    let wary = wary();
     let (unmoved, _) = judged(&wary, 4, 60, World::default());
     for config in [wary, FoldConfig { inflation: Some(INFLATION), ..wary }, together(wary)] {
         for by in [1.0, 4.0] {
@@ -167,15 +165,18 @@ fn a_robot_that_was_carried_off_finds_back() {
 /// A liar that has a frame of its own comes back at best to be found again.
 #[test]
 fn a_liar_does_not_find_back() {
-    let config = FoldConfig { join: true, ..wary() };
+    let config = wary();
     for (what, lie) in &lies(3)[1..] {
         for seed in 0..20 {
             let run = team(seed, 10, 60, &config, World { lie: Some(*lie), ..ten() });
             let mut ledger = run.ledger(config);
             let joint = ledger.settle();
-            let found = distrusted(joint);
-            let kept_out = matches!(found[..], [(4, _, true)]) || !joint.is_in_map(RobotId(4));
-            assert!(kept_out && outside(joint) + found.len() == 1, "{what} {seed}: {found:?}");
+            let believed = |robot: RobotId| {
+                joint.is_in_map(robot)
+                    && joint.member(robot).is_some_and(|of| of.reputation.distrust.is_none())
+            };
+            let kept_out: Vec<RobotId> = (1..=10).map(RobotId).filter(|robot| !believed(*robot)).collect();
+            assert_eq!(kept_out, [RobotId(4)], "{what} {seed}");
         }
     }
 }
@@ -228,7 +229,7 @@ fn levels_follow_noise_that_is_understated() {
         let (stated, stated_nees) = judged(&FoldConfig::default(), 4, 60, world);
         let (followed, nees) = judged(&following(), 4, 60, world);
         println!("{slip} x {by}: {stated} NEES {stated_nees}, following {followed} NEES {nees}");
-        if by == 1.0 {
+        if by < 1.5 {
             // It costs next to nothing where it is not needed, and is on the safe side.
             assert!(
                 followed < 1.02 * stated && nees < stated_nees && nees > 0.75,

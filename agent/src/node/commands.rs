@@ -267,10 +267,10 @@ pub enum Standing {
 impl Standing {
     /// Of a member.
     pub(super) fn of(joint: &Joint, member: &Member) -> Self {
-        match member.distrust {
+        match member.reputation.distrust {
             Some(distrust) if distrust.whole => Self::Distrusted,
             Some(_) => Self::NotOnTheMap,
-            None if member.detached.is_some() && !joint.is_in_map(member.robot) => Self::Detached,
+            None if member.reputation.detached.is_some() && !joint.is_in_map(member.robot) => Self::Detached,
             None => Self::Sound,
         }
     }

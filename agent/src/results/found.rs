@@ -2,7 +2,7 @@
 
 use pleiad_estimation::Timestamp;
 use pleiad_estimation::geometry::Matrix3;
-use pleiad_estimation::joint::{Block, Joint, Member, ParameterKind};
+use pleiad_estimation::joint::{Block, Joint, Member, ParameterKind, Reputation};
 use serde::{Deserialize, Serialize};
 
 /// Parameters and landmarks, as the whole team knows them.
@@ -38,8 +38,10 @@ pub struct FoundRobot {
 impl FoundRobot {
     /// What is known of a member, if there is anything.
     pub fn of(member: &Member) -> Option<Self> {
-        let Member { robot, noise_level, detached, distrust, .. } = *member;
-        let plain = noise_level == 1.0 && detached.is_none() && distrust.is_none();
+        let Member { robot, reputation, .. } = *member;
+        let Reputation { noise_level, detached, distrust, .. } = reputation;
+        // Doubts that led to nothing say nothing.
+        let plain = reputation == Reputation { doubt: reputation.doubt, ..Reputation::default() };
         (!plain).then(|| Self {
             robot: robot.0,
             noise_level,

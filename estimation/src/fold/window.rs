@@ -181,11 +181,15 @@ fn fold_stretch(
         told(index, residual, &|| pass.clone().ended());
     }
     *joint = pass.ended();
-    if let (true, Some(quarantine)) = (config.join, &config.quarantine) {
+    if let Some(quarantine) = &config.quarantine {
         // Within a stretch nobody changes frames: who was found to contradict the others in it does at its end.
         let began = facts.first().map_or(Timestamp::MIN, |(key, _)| key.time);
         let found = |member: &Member| {
-            member.distrust.filter(|of| of.whole && of.since >= began).map(|of| (member.robot, of.since))
+            member
+                .reputation
+                .distrust
+                .filter(|of| of.whole && of.since >= began)
+                .map(|of| (member.robot, of.since))
         };
         let found: Vec<_> = joint.members().filter_map(found).collect();
         for (robot, since) in found {
@@ -358,7 +362,7 @@ impl Pass {
         let residual = |outcome, nis| Residual { outcome, dimension, innovation, nis };
         let prepare =
             |noise: &Matrix3| self.joint.covariance().prepare(dimension, &innovation, noise, &participants);
-        let stated = event.noise * self.joint.part(event.participants[0].0).noise_level;
+        let stated = event.noise * self.joint.part(event.participants[0].0).reputation.noise_level;
         let weight = match (&config.clutter, at) {
             (Some(_), Some(_)) => weight(&linearized, &stated, threshold),
             _ => 1.0,

@@ -1,7 +1,7 @@
 //! What the rows of the joint state stand for, three by three.
 
 use super::component::{Anchor, Component};
-use super::standing::Distrust;
+use super::standing::Reputation;
 use crate::fact::Calibration;
 use crate::geometry::{Matrix3, Vector3};
 use crate::symmetric::Symmetric3;
@@ -25,15 +25,8 @@ pub struct Member {
     pub folded_motion: Matrix3,
     /// The frame it has a place in.
     pub component: Component,
-    /// By how much more noise, as a variance, there is on what it says than it says; 1 unless levels follow
-    /// ([`Inflation`](crate::fold::Inflation)).
-    pub noise_level: f64,
-    /// What speaks against what it says, and against what it answers, nats.
-    pub doubt: [f64; 2],
-    /// When it was last taken out of the frame that it contradicted, into one of its own.
-    pub detached: Option<Timestamp>,
-    /// It is not believed any more ([`Quarantine`](crate::fold::Quarantine)).
-    pub distrust: Option<Distrust>,
+    /// How far it is believed.
+    pub reputation: Reputation,
     pub(super) placed: bool,
 }
 
@@ -56,10 +49,7 @@ impl Member {
             folded_noise,
             folded_motion,
             component,
-            noise_level: 1.0,
-            doubt: [0.0; 2],
-            detached: None,
-            distrust: None,
+            reputation: Reputation::default(),
             placed: true,
         }
     }
@@ -101,6 +91,7 @@ pub struct MappedLandmark {
 }
 
 /// What three rows of the joint state stand for.
+#[allow(clippy::large_enum_variant, reason = "most blocks are robots")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Block {
     /// A robot; the error of its correction.
@@ -137,16 +128,7 @@ impl Block {
                 if member.folded_motion != Matrix3::zeros() {
                     words.extend(member.folded_motion.iter().map(|entry| entry.to_bits()));
                 }
-                if member.noise_level != 1.0 {
-                    words.push(member.noise_level.to_bits());
-                }
-                if member.doubt != [0.0; 2] {
-                    words.extend(member.doubt.map(f64::to_bits));
-                }
-                words.extend(member.detached.map(|at| at.0.cast_unsigned()));
-                words.extend(
-                    member.distrust.iter().flat_map(|of| [of.since.0.cast_unsigned(), u64::from(of.whole)]),
-                );
+                words.extend(member.reputation.words());
                 words
             }
             Self::Parameters(of) => {

@@ -1,6 +1,6 @@
 //! What a boot does to the joint: a continued one carries a robot's block on, a lost one ends it.
 
-use super::{Block, Component, ErrorForm, Joint, Parameters, block};
+use super::{Block, Component, ErrorForm, Joint, Parameters, Reputation, block};
 use crate::fact::{Boot, Calibration, Continuation, NominalState};
 use crate::geometry::{Matrix3, Vector3};
 use crate::symmetric::Symmetric3;
@@ -61,7 +61,7 @@ impl Joint {
         for (kind, [a, b, c]) in wanted {
             if self.parameter_index(robot, kind).is_none() {
                 let value = Vector3::zeros();
-                let index = self.add(Block::Parameters(Parameters { robot, kind, value, since }));
+                let index = self.add(&Block::Parameters(Parameters { robot, kind, value, since }));
                 self.covariance.set_diagonal(index, Symmetric3::diagonal(a * a, b * b, c * c));
             }
         }
@@ -84,9 +84,8 @@ impl Joint {
             .map_or_else(Matrix3::zeros, |last| s.adjoint() * (member.folded_motion - last.motion));
         member.boot = index;
         // Whoever begins anew is believed anew.
-        member.distrust = None;
-        member.detached = None;
-        member.doubt = [0.0; 2];
+        member.reputation =
+            Reputation { noise_level: member.reputation.noise_level, ..Reputation::default() };
         if form == ErrorForm::Additive {
             // Its coordinates do not stay put, so that what is carried is folded here, with the gap.
             let gap = continuation.gap.congruence(&boot.nominal.adjoint());

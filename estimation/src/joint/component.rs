@@ -146,7 +146,7 @@ impl Joint {
     /// Keeps where the robot or landmark in a block is now.
     pub(crate) fn anchor(&mut self, index: usize, pose: Pose2) -> End {
         let component = self.component(index).unwrap_or(Component::MAP);
-        let at = self.add(Block::Anchor(Anchor { pose, component }));
+        let at = self.add(&Block::Anchor(Anchor { pose, component }));
         self.covariance.couple(at, index, &Matrix3::identity());
         End::Anchor(at)
     }

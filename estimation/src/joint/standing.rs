@@ -60,6 +60,40 @@ impl Party {
     }
 }
 
+/// How far a robot is believed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reputation {
+    /// By how much more noise, as a variance, there is on what it says than it says; 1 unless levels follow
+    /// ([`Inflation`]).
+    pub noise_level: f64,
+    /// What speaks against what it says, and against what it answers, nats.
+    pub doubt: [f64; 2],
+    /// When it was last taken out of the frame that it contradicted, into one of its own.
+    pub detached: Option<Timestamp>,
+    /// It is not believed any more ([`Quarantine`]).
+    pub distrust: Option<Distrust>,
+}
+
+impl Default for Reputation {
+    fn default() -> Self {
+        Self { noise_level: 1.0, doubt: [0.0; 2], detached: None, distrust: None }
+    }
+}
+
+impl Reputation {
+    /// The bits of it, for comparing two estimates; none while nothing is known.
+    pub(super) fn words(&self) -> Vec<u64> {
+        if *self == Self::default() {
+            return Vec::new();
+        }
+        let mut words = vec![self.noise_level.to_bits()];
+        words.extend(self.doubt.map(f64::to_bits));
+        words.extend(self.detached.map(|at| at.0.cast_unsigned()));
+        words.extend(self.distrust.iter().flat_map(|of| [of.since.0.cast_unsigned(), u64::from(of.whole)]));
+        words
+    }
+}
+
 /// How much a robot's word is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Distrust {
@@ -134,7 +168,7 @@ impl Joint {
     ) -> Option<RobotId> {
         let member = robots.find_map(|index| {
             let member = self.part(index);
-            member.distrust.filter(|distrust| distrust.whole || of_map).map(|_| member)
+            member.reputation.distrust.filter(|distrust| distrust.whole || of_map).map(|_| member)
         });
         member.map(|member| member.robot)
     }
@@ -145,8 +179,8 @@ impl Joint {
         let ratio = of.nis.min(of.gate) / of.dimension as f64;
         let step = of.weight * (ratio - 1.0) / inflation.readings;
         for index in robots {
-            let member = self.part_mut(*index);
-            member.noise_level = (member.noise_level * libm::exp(step)).clamp(1.0, inflation.most);
+            let level = &mut self.part_mut(*index).reputation.noise_level;
+            *level = (*level * libm::exp(step)).clamp(1.0, inflation.most);
         }
     }
 
@@ -169,7 +203,7 @@ impl Joint {
         let [sound, without_author, without_partner] =
             self.shares_between_others(author, partner, of, quarantine);
         for ((index, side), sound) in robots.iter().zip([0, 1]).zip([without_author, without_partner]) {
-            let doubt = &mut self.part_mut(*index).doubt[side];
+            let doubt = &mut self.part_mut(*index).reputation.doubt[side];
             *doubt = counted(*doubt, surprises, sound, most);
         }
         let place = place.unwrap_or_else(|at| {
@@ -193,7 +227,7 @@ impl Joint {
     /// Stops believing a robot.
     pub(crate) fn distrust(&mut self, robot: RobotId, distrust: Distrust) {
         if let Some(index) = self.index(robot) {
-            self.part_mut(index).distrust = Some(distrust);
+            self.part_mut(index).reputation.distrust = Some(distrust);
             self.acquit(robot, distrust.whole);
         }
     }
@@ -204,7 +238,7 @@ impl Joint {
     pub(crate) fn detach(&mut self, robot: RobotId, now: Timestamp, since: Timestamp) -> bool {
         let Some(index) = self.index(robot) else { return false };
         let member = self.part(index);
-        let before = member.detached.is_some_and(|last| last >= since);
+        let before = member.reputation.detached.is_some_and(|last| last >= since);
         if before || self.form != ErrorForm::Invariant || self.is_alone(robot) {
             return false;
         }
@@ -213,8 +247,8 @@ impl Joint {
         let member = self.part_mut(index);
         member.correction = member.nominal.inverse();
         member.component = Component::new(now, robot);
-        member.detached = Some(now);
-        member.distrust = None;
+        member.reputation.detached = Some(now);
+        member.reputation.distrust = None;
         self.acquit(robot, true);
         true
     }
@@ -229,7 +263,7 @@ impl Joint {
         self.contradictions.clear();
         for block in &mut self.blocks {
             if let Block::Robot(member) = block {
-                member.doubt = [0.0; 2];
+                member.reputation.doubt = [0.0; 2];
             }
         }
     }
@@ -291,7 +325,9 @@ impl Joint {
         if let Party::Robot(robot) = liar
             && many
             && first.level - second >= 0.5 * quarantine.level
-            && self.member(*robot).is_some_and(|of| of.doubt[0] + of.doubt[1] >= quarantine.level)
+            && self
+                .member(*robot)
+                .is_some_and(|of| of.reputation.doubt.iter().sum::<f64>() >= quarantine.level)
         {
             return Some((*robot, true));
         }

@@ -50,7 +50,7 @@ impl Joint {
             correction: member.correction,
             nominal: member.nominal,
             folded_noise: member.folded_noise,
-            noise_level: member.noise_level,
+            noise_level: member.reputation.noise_level,
             folded_motion: member.folded_motion,
             block: self.covariance().block(index, index),
             parameters: parameters.collect(),
@@ -73,10 +73,11 @@ impl RobotView {
     pub(crate) fn estimate(&self, time: Timestamp, state: &NominalState) -> (Pose2, Symmetric3) {
         let correction = self.correction_at(time, state);
         let pose = correction.compose(&state.nominal);
-        let mut grown = state.noise_sum.minus(self.folded_noise).congruence(&correction.adjoint());
-        if self.noise_level != 1.0 {
-            grown = grown.scaled(self.noise_level);
-        }
+        let grown = state
+            .noise_sum
+            .minus(self.folded_noise)
+            .congruence(&correction.adjoint())
+            .scaled(self.noise_level);
         let published = pose.additive_from_invariant();
         let mut block = Symmetric3::from_lower(&self.block);
         let influences = self.influences(time, state);

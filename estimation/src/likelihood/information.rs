@@ -198,13 +198,14 @@ mod tests {
 
     #[test]
     fn a_maximum_on_a_ledge_is_said_to_be_rough() {
-        // A parabola with a standard error of 0.05, and a cliff of 30 at 0.08.
-        let evaluate = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
-            let ledge = |x: f64| if x.abs() > 0.08 { -30.0 } else { 0.0 };
-            points.iter().map(|x| vec![-200.0 * x[0] * x[0] + ledge(x[0])]).collect()
-        };
+        // Two data whose scores are opposite, with a standard error of 0.05 together; and a cliff of 30 at 0.08.
+        let parabola = |x: f64| [0.5_f64, -0.5].map(|side| -100.0 * x * x + 20.0 * 2.0_f64.sqrt() * side * x);
         let clean = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
-            points.iter().map(|x| vec![-200.0 * x[0] * x[0]]).collect()
+            points.iter().map(|x| parabola(x[0]).to_vec()).collect()
+        };
+        let evaluate = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            let ledge = |x: f64| if x.abs() > 0.08 { -15.0 } else { 0.0 };
+            points.iter().map(|x| parabola(x[0]).map(|datum| datum + ledge(x[0])).to_vec()).collect()
         };
         assert!(information(&clean, &[0.0], 0.0).ranges[0].is_smooth());
         assert!(!information(&evaluate, &[0.0], 0.0).ranges[0].is_smooth());

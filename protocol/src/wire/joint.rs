@@ -3,7 +3,7 @@
 use pleiad_estimation::geometry::Matrix3;
 use pleiad_estimation::joint::{
     Anchor, Block, Component, Contradiction, Distrust, End, MappedLandmark, Measured, Member, ParameterKind,
-    Parameters, Party, Tie,
+    Parameters, Party, Reputation, Tie,
 };
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{BootIndex, LandmarkId, RobotId, Timestamp};
@@ -23,13 +23,46 @@ pub(super) struct WireMember {
     /// By columns; none if nothing was ever folded.
     folded_motion: Option<[f64; 9]>,
     component: WireComponent,
-    /// None is 1.
-    noise_level: Option<f64>,
-    doubt: Option<[f64; 2]>,
+    /// None as long as nothing is known.
+    reputation: Option<WireReputation>,
+    placed: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+struct WireReputation {
+    noise_level: f64,
+    doubt: [f64; 2],
     detached_ns: Option<i64>,
     /// Since when, and whether in whole.
     distrust: Option<(i64, bool)>,
-    placed: bool,
+}
+
+impl TryFrom<WireReputation> for Reputation {
+    type Error = ProtocolError;
+
+    fn try_from(wire: WireReputation) -> Result<Self, ProtocolError> {
+        let noise_level = check::number("noise_level", wire.noise_level)?;
+        if noise_level < 1.0 {
+            let (field, expected) = ("noise_level".into(), "at least 1");
+            return Err(ProtocolError::Number { field, found: noise_level, expected });
+        }
+        Ok(Self {
+            noise_level,
+            doubt: check::pair("doubt", wire.doubt)?,
+            detached: wire.detached_ns.map(Timestamp),
+            distrust: wire.distrust.map(|(since, whole)| Distrust { since: Timestamp(since), whole }),
+        })
+    }
+}
+
+fn wire_reputation(of: &Reputation) -> Option<WireReputation> {
+    let Reputation { noise_level, doubt, detached, distrust } = *of;
+    (*of != Reputation::default()).then(|| WireReputation {
+        noise_level,
+        doubt,
+        detached_ns: detached.map(|at| at.0),
+        distrust: distrust.map(|of| (of.since.0, of.whole)),
+    })
 }
 
 /// Who began a frame, and when; none is the map.
@@ -54,7 +87,7 @@ pub(super) struct WireTie {
 
 #[derive(Serialize, Deserialize)]
 pub(super) enum WireBlock {
-    Robot(WireMember),
+    Robot(Box<WireMember>),
     Parameters { robot: u32, kind: WireParameters, value: [f64; 3], since_ns: i64 },
     Landmark(u32, WirePose, WireComponent),
     Anchor(WirePose, WireComponent),
@@ -97,18 +130,7 @@ impl TryFrom<WireMember> for (Member, bool) {
             member.folded_motion = Matrix3::from_column_slice(&columns);
         }
         member.component = component(wire.component);
-        if let Some(level) = wire.noise_level {
-            member.noise_level = check::number("noise_level", level)?;
-            if level < 1.0 {
-                let expected = "at least 1";
-                return Err(ProtocolError::Number { field: "noise_level".into(), found: level, expected });
-            }
-        }
-        if let Some(doubt) = wire.doubt {
-            member.doubt = check::pair("doubt", doubt)?;
-        }
-        member.detached = wire.detached_ns.map(Timestamp);
-        member.distrust = wire.distrust.map(|(since, whole)| Distrust { since: Timestamp(since), whole });
+        member.reputation = wire.reputation.map_or_else(|| Ok(Reputation::default()), TryInto::try_into)?;
         Ok((member, wire.placed))
     }
 }
@@ -119,7 +141,7 @@ impl TryFrom<WireBlock> for (Block, bool) {
     fn try_from(wire: WireBlock) -> Result<Self, ProtocolError> {
         Ok(match wire {
             WireBlock::Robot(member) => {
-                let (member, placed) = member.try_into()?;
+                let (member, placed) = (*member).try_into()?;
                 (Block::Robot(member), placed)
             }
             WireBlock::Parameters { robot, kind, value, since_ns } => {
@@ -244,7 +266,7 @@ pub(super) fn wire_block(block: &Block, placed: bool) -> WireBlock {
     match block {
         Block::Robot(member) => {
             let motion = member.folded_motion;
-            WireBlock::Robot(WireMember {
+            WireBlock::Robot(Box::new(WireMember {
                 robot: member.robot.0,
                 boot: member.boot.0,
                 correction: check::wire_pose(&member.correction),
@@ -253,12 +275,9 @@ pub(super) fn wire_block(block: &Block, placed: bool) -> WireBlock {
                 folded_motion: (motion != Matrix3::zeros())
                     .then(|| std::array::from_fn(|entry| motion[entry])),
                 component: wire_component(member.component),
-                noise_level: (member.noise_level != 1.0).then_some(member.noise_level),
-                doubt: (member.doubt != [0.0; 2]).then_some(member.doubt),
-                detached_ns: member.detached.map(|at| at.0),
-                distrust: member.distrust.map(|of| (of.since.0, of.whole)),
+                reputation: wire_reputation(&member.reputation),
                 placed,
-            })
+            }))
         }
         Block::Parameters(of) => WireBlock::Parameters {
             robot: of.robot.0,
