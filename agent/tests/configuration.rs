@@ -44,6 +44,7 @@ fn full() -> Table {
         [filter.clutter]
         share = 0.1
         reach_m = 10.0
+        misnamed = 0.1
         [calibration]
         [prior]
         x_m = 0.0
@@ -174,7 +175,9 @@ fn documented_defaults_are_the_defaults() {
     for key in ["prior.for_boot", "faults.seed"] {
         defaults.insert(key.to_owned(), Value::Integer(0));
     }
-    for key in ["sensors.range.sigma_per_m", "sensors.range_bearing.sigma_range_per_m"] {
+    for key in
+        ["sensors.range.sigma_per_m", "sensors.range_bearing.sigma_range_per_m", "filter.clutter.misnamed"]
+    {
         defaults.insert(key.to_owned(), Value::Float(0.0));
     }
     for key in ["filter.relinearize.block_s", "filter.relinearize.ahead_s"] {

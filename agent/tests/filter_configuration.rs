@@ -56,6 +56,11 @@ fn what_is_to_be_found_out_has_values_that_make_sense() {
         ("[filter]\nclutter = { share = 1.0, reach_m = 8.0 }\n", "filter.clutter.share"),
         ("[filter]\nclutter = { share = 0.1, reach_m = -8.0 }\n", "filter.clutter.reach_m"),
         ("strategy = 'pairwise'\n[filter]\nclutter = { share = 0.1, reach_m = 8.0 }\n", "strategy"),
+        ("[filter]\nclutter = { share = 0.1, reach_m = 8.0, misnamed = 0.95 }\n", "filter.clutter.misnamed"),
+        (
+            "[filter]\nrelinearize = {}\nclutter = { share = 0.1, reach_m = 8.0, misnamed = 0.05 }\n",
+            "filter.clutter.misnamed",
+        ),
         ("[filter]\ninflation = { readings = 0.5 }\n", "filter.inflation.readings"),
         ("[filter]\ninflation = { most = 1.0 }\n", "filter.inflation.most"),
         ("[filter]\nquarantine = { level = 0.0 }\n", "filter.quarantine.level"),

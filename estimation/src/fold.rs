@@ -2,6 +2,7 @@
 
 mod across;
 mod config;
+mod named;
 mod window;
 
 pub use config::{Clutter, DEFAULT_GATE, FOLD_VERSION, FoldConfig, Inflation, Quarantine};
@@ -107,6 +108,8 @@ pub enum Outcome {
     Placed,
     /// The joint was updated.
     Used,
+    /// The joint was updated, and that it was of another landmark than it says is the likeliest.
+    UsedAs(LandmarkId),
     /// It was seen between two frames of which it is not yet known how they lie to one another, and waits for more.
     Tied,
     /// It was the last that was needed to know how two frames lie to one another.
@@ -229,10 +232,19 @@ fn fold_observation(
         joint.map_landmark(*landmark, taken[0].0, mount, from, position, &spread);
         return Ok(Residual::without_measurement(Outcome::Placed));
     }
-    let at = linearize(quantity, &poses)?;
-    let mut participants = participants(quantity, &taken, &influences, &at);
-    let odds = config.clutter.map(|clutter| clutter.log_odds(quantity));
-    let (residual, weight) = update(joint, config, &at, &noise, &mut participants, odds)?;
+    named::keep_stated(joint, config, quantity);
+    let (residual, weight) = match &config.clutter {
+        Some(clutter) if config.misnamed > 0.0 && named::claimed(quantity).is_some() => {
+            named::fold_named(joint, (config, clutter), quantity, &noise, (&taken, &poses, &influences))?
+        }
+        clutter => {
+            // Nobody but who is named answers: that it was another robot is as good as nothing.
+            let odds = clutter.map(|clutter| clutter.and(config.misnamed).log_odds(quantity));
+            let at = linearize(quantity, &poses)?;
+            let mut participants = participants(quantity, &taken, &influences, &at);
+            update(joint, config, &at, &noise, &mut participants, odds)?
+        }
+    };
     reflect(joint, config, key.time, quantity, &taken, (residual.dimension, residual.nis, weight), true);
     Ok(residual)
 }

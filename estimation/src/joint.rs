@@ -4,6 +4,7 @@ mod block;
 mod boots;
 mod component;
 mod covariance;
+mod mixed;
 mod standing;
 mod view;
 
@@ -43,6 +44,8 @@ pub struct JointParts {
     pub ties: Vec<Tie>,
     /// Who contradicts whom.
     pub contradictions: Vec<Contradiction>,
+    /// Where landmarks are said to be, where names may be wrong.
+    pub stated: Vec<(LandmarkId, [f64; 2])>,
     /// How many measurements went into it.
     pub updates: u64,
 }
@@ -85,6 +88,8 @@ pub struct Joint {
     ties: Vec<Tie>,
     /// In the order of author and whom it measured.
     contradictions: Vec<Contradiction>,
+    /// Where landmarks are said to be, in the order of their numbers; kept where names may be wrong.
+    stated: Vec<(LandmarkId, [f64; 2])>,
     updates: u64,
 }
 
@@ -97,6 +102,7 @@ impl Joint {
             covariance: JointCovariance::default(),
             ties: Vec::new(),
             contradictions: Vec::new(),
+            stated: Vec::new(),
             updates: 0,
         }
     }
@@ -171,12 +177,13 @@ impl Joint {
             lower: self.covariance.lower().to_vec(),
             ties: self.ties.clone(),
             contradictions: self.contradictions.clone(),
+            stated: self.stated.clone(),
             updates: self.updates,
         }
     }
 
     /// The joint of these parts; `None` if the covariance does not have rows for every block, a tie has no anchor, or
-    /// contradictions are not in order.
+    /// contradictions or stated landmarks are not in order.
     pub fn from_parts(form: ErrorForm, parts: JointParts) -> Option<Self> {
         let covariance = JointCovariance::from_lower(3 * parts.blocks.len(), parts.lower)?;
         let blocks = parts.blocks.into_iter().map(|(block, placed)| match block {
@@ -189,10 +196,11 @@ impl Joint {
             End::Map | End::Point(_) => true,
         };
         let pairs = parts.contradictions.iter().map(|of| (of.author, of.of));
-        let sound =
-            pairs.is_sorted_by(|a, b| a < b) && parts.ties.iter().all(|tie| tie.ends.iter().all(anchored));
-        let JointParts { ties, contradictions, updates, .. } = parts;
-        sound.then_some(Self { form, blocks, covariance, ties, contradictions, updates })
+        let sound = parts.stated.is_sorted_by(|a, b| a.0 < b.0)
+            && pairs.is_sorted_by(|a, b| a < b)
+            && parts.ties.iter().all(|tie| tie.ends.iter().all(anchored));
+        let JointParts { ties, contradictions, stated, updates, .. } = parts;
+        sound.then_some(Self { form, blocks, covariance, ties, contradictions, stated, updates })
     }
 
     /// Estimate and covariance of one robot at `state` of its nominal trajectory, when its clock shows `time`. The covariance is of
@@ -461,6 +469,8 @@ impl Joint {
         let blocks = self.blocks.iter().flat_map(Block::words);
         let blocks = blocks.chain(self.ties.iter().flat_map(Tie::words));
         let blocks = blocks.chain(self.contradictions.iter().flat_map(Contradiction::words));
+        let stated = self.stated.iter().flat_map(|(id, [x, y])| [u64::from(id.0), x.to_bits(), y.to_bits()]);
+        let blocks = blocks.chain(stated);
         blocks.chain(self.covariance.lower().iter().map(|entry| entry.to_bits()))
     }
 }

@@ -200,7 +200,7 @@ pub fn by_kind(ledger: &Ledger, start: Timestamp) -> (Vec<NisSeries>, Vec<FactCo
             pending: 0,
         });
         match residual.outcome {
-            Outcome::Used => count.used += 1,
+            Outcome::Used | Outcome::UsedAs(_) => count.used += 1,
             Outcome::Rejected { .. } => count.rejected += 1,
             _ => {}
         }
@@ -210,7 +210,7 @@ pub fn by_kind(ledger: &Ledger, start: Timestamp) -> (Vec<NisSeries>, Vec<FactCo
                 degrees_of_freedom: residual.dimension,
                 points: Vec::new(),
             });
-            let used = residual.outcome == Outcome::Used;
+            let used = matches!(residual.outcome, Outcome::Used | Outcome::UsedAs(_));
             series.points.push(NisPoint { time_s: key.time.seconds_since(start), nis: residual.nis, used });
         }
     }

@@ -61,6 +61,14 @@ pub struct ClutterSection {
     pub share: f64,
     /// How far sensors see, and how far from the origin position fixes may be, m.
     pub reach_m: f64,
+    /// Share of sightings that are of another than they name.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub misnamed: f64,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_zero(share: &f64) -> bool {
+    *share <= 0.0
 }
 
 impl From<ClutterSection> for Clutter {
@@ -131,6 +139,17 @@ impl AgentConfig {
             ));
         }
         positive("filter.clutter.reach_m", clutter.reach_m)?;
+        if !(clutter.misnamed >= 0.0 && clutter.share + clutter.misnamed < 1.0) {
+            let expected = "zero or a share that leaves something beside filter.clutter.share";
+            return Err(value("filter.clutter.misnamed", clutter.misnamed, expected));
+        }
+        if clutter.misnamed > 0.0 && self.filter.relinearize.is_some() {
+            let expected = "0: with [filter.relinearize] names are taken for right";
+            return Err(value("filter.clutter.misnamed", clutter.misnamed, expected));
+        }
+        if clutter.misnamed > 0.0 {
+            self.needs_facts("filter.clutter.misnamed")?;
+        }
         self.needs_exact("filter.clutter")
     }
 

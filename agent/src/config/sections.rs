@@ -94,6 +94,7 @@ impl FilterSection {
             form,
             gate: self.gate,
             clutter: self.clutter.map(Into::into),
+            misnamed: self.clutter.map_or(0.0, |clutter| clutter.misnamed),
             inflation: self.inflation.map(Into::into),
             quarantine: self.quarantine.map(Into::into),
             join: self.join,

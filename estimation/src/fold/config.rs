@@ -21,6 +21,8 @@ pub struct FoldConfig {
     pub gate: [f64; 3],
     /// Some observations are of nothing; `None` if all are of what they say.
     pub clutter: Option<Clutter>,
+    /// Share of sightings that are of another than they name, beside those that are of nothing; of use where there is clutter.
+    pub misnamed: f64,
     /// Stated levels of noise are raised where readings surprise; `None` if they are what is stated.
     pub inflation: Option<Inflation>,
     /// A robot that contradicts the others is not believed any more; `None` if everybody always is.
@@ -45,6 +47,11 @@ impl Clutter {
     /// Logarithm of the odds of an observation's being of nothing, by the density of its readings.
     pub(super) fn log_odds(&self, quantity: &Quantity) -> f64 {
         libm::log(self.share / (1.0 - self.share)) - self.log_volume(quantity)
+    }
+
+    /// With a further share that is as good as nothing.
+    pub(super) fn and(self, share: f64) -> Self {
+        Self { share: (self.share + share).min(0.5 * (1.0 + self.share)), ..self }
     }
 
     /// Logarithm of the volume of the readings that a sensor can give.
@@ -100,6 +107,7 @@ impl Default for FoldConfig {
             form: ErrorForm::Invariant,
             gate: DEFAULT_GATE,
             clutter: None,
+            misnamed: 0.0,
             inflation: None,
             quarantine: None,
             join: false,
@@ -128,7 +136,8 @@ impl FoldConfig {
         let inflation = self.inflation.iter().flat_map(|of| [of.readings.to_bits(), of.most.to_bits(), 3]);
         let quarantine =
             self.quarantine.iter().flat_map(|of| [of.level.to_bits(), of.window_ns.cast_unsigned(), 4]);
-        let words = words.chain(inflation).chain(quarantine);
+        let misnamed = (self.misnamed > 0.0).then_some([self.misnamed.to_bits(), 5]);
+        let words = words.chain(inflation).chain(quarantine).chain(misnamed.into_iter().flatten());
         let Fingerprint(bytes) = Fingerprint::of_words(words);
         bytes[..8].iter().fold(0, |hash, byte| hash << 8 | u64::from(*byte))
     }

@@ -324,6 +324,7 @@ pub(super) fn joint_at(pose: &Pose2, covariance: &Matrix3, at: &NominalState, up
         lower: lower.to_vec(),
         ties: Vec::new(),
         contradictions: Vec::new(),
+        stated: Vec::new(),
         updates,
     };
     // A robot's block has six entries: there is nothing that could not fit.

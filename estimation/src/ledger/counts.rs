@@ -55,7 +55,7 @@ impl FactCounts {
             }
         }
         match record.residual.map(|residual| residual.outcome) {
-            Some(Outcome::Used | Outcome::Joined { .. }) => self.used += 1,
+            Some(Outcome::Used | Outcome::UsedAs(_) | Outcome::Joined { .. }) => self.used += 1,
             Some(Outcome::Rejected { .. }) => self.rejected += 1,
             // Of what waits between two frames some is used when they join.
             Some(Outcome::Skipped(_) | Outcome::Tied) => self.skipped += 1,

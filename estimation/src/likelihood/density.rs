@@ -45,7 +45,7 @@ fn score(joint: &mut Joint, config: &FoldConfig, key: &FactKey, fact: &Fact) -> 
     let residual = fold(joint, config, key, fact);
     let ((nis, log_normal), quantity) = predicted?;
     let used = match residual.outcome {
-        Outcome::Used => true,
+        Outcome::Used | Outcome::UsedAs(_) => true,
         Outcome::Rejected { .. } => false,
         // What waits between two frames is predicted by nothing.
         Outcome::Booted | Outcome::Placed | Outcome::Tied | Outcome::Joined { .. } | Outcome::Skipped(_) => {

@@ -87,8 +87,14 @@ pub struct World<'a> {
     pub gps: bool,
     /// All have it.
     pub all_gps: bool,
-    /// Landmarks that nobody knows the places of.
+    /// Landmarks that nobody knows the places of, unless they are `known`.
     pub landmarks: &'a [[f64; 2]],
+    /// Everybody knows where the landmarks are.
+    pub known: bool,
+    /// Share of sightings of landmarks that name another one.
+    pub misnamed: f64,
+    /// The first two landmarks always go by each other's names.
+    pub swapped: bool,
     /// Share of sightings of robots that are of nothing: any range and any bearing.
     pub garbage: f64,
     /// Noise of the odometry, over [`NOISE`].
@@ -151,6 +157,9 @@ impl Default for World<'_> {
             gps: true,
             all_gps: false,
             landmarks: &[],
+            known: false,
+            misnamed: 0.0,
+            swapped: false,
             garbage: 0.0,
             slip: 1.0,
             understated: 1.0,
@@ -240,7 +249,7 @@ pub fn run(
             // Each robot looks at each now and then, at ticks of its own.
             for robot in 0..robots.len() {
                 if (tick + 7 * robot as i64 + 3 * landmark as i64) % 20 == 0 {
-                    see_landmark(&mut run, robot, landmark as u32, *place, tick, &mut random);
+                    see_landmark(&mut run, robot, landmark, *place, tick, &world, &mut random);
                 }
             }
         }
@@ -280,14 +289,28 @@ const VIEW_M: f64 = 5.0;
 fn see_landmark(
     run: &mut Run,
     robot: usize,
-    landmark: u32,
+    landmark: usize,
     [x, y]: [f64; 2],
     tick: i64,
+    world: &World<'_>,
     random: &mut ChaCha8Rng,
 ) {
     let seen = run.robots[robot].at_label(tick).between(&Pose2::new(x, y, 0.0)).position();
     if seen.norm() < VIEW_M {
-        let quantity = Quantity::Feature { landmark: LandmarkId(landmark), relative: reading(seen, random) };
+        let relative = reading(seen, random);
+        let mut name = landmark;
+        if world.swapped && landmark < 2 {
+            name = 1 - landmark;
+        }
+        if world.misnamed > 0.0 && random.random::<f64>() < world.misnamed {
+            name = (landmark + random.random_range(1..world.landmarks.len())) % world.landmarks.len();
+        }
+        let landmark = LandmarkId(name as u32);
+        let quantity = if world.known {
+            Quantity::Landmark { landmark, position_m: world.landmarks[name], relative }
+        } else {
+            Quantity::Feature { landmark, relative }
+        };
         observation(&mut run.robots[robot], robot as u32 + 1, tick, quantity, &SIGHTING);
     }
 }

@@ -19,8 +19,9 @@ pub struct FilterArgs {
     /// Linearize facts together: blocks of so many seconds, smoothed so far beyond, in so many passes, as in 5:5:4.
     #[arg(long, value_name = "BLOCK_S:AHEAD_S:PASSES")]
     pub relinearize: Option<RelinearizeArg>,
-    /// So large a share of observations is of nothing, seen up to so far away: each is weighed by its probability.
-    #[arg(long, value_name = "SHARE:REACH_M")]
+    /// So large a share of observations is of nothing, seen up to so far away: each is weighed by its probability. With a third
+    /// number, such a share of the sightings is of another than they name.
+    #[arg(long, value_name = "SHARE:REACH_M[:MISNAMED]")]
     pub clutter: Option<ClutterArg>,
     /// Raise stated noise where readings surprise, over so many readings of a robot, by at most such a factor on its
     /// variances, as in 20:10.

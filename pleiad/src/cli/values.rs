@@ -86,8 +86,15 @@ impl FromStr for ClutterArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let [share, reach_m] = two(text, "SHARE:REACH_M as in 0.05:10")?;
-        Ok(Self(ClutterSection { share, reach_m }))
+        let (of_nothing, misnamed) = match text.rsplit_once(':') {
+            Some((front, last)) if front.contains(':') => (front, Some(last)),
+            _ => (text, None),
+        };
+        let expected = "SHARE:REACH_M or SHARE:REACH_M:MISNAMED as in 0.05:10:0.02";
+        let [share, reach_m] = two(of_nothing, expected)?;
+        let misnamed = misnamed.map_or(Ok(0.0), str::parse);
+        let misnamed = misnamed.map_err(|_| format!("found {text:?}, expected {expected}"))?;
+        Ok(Self(ClutterSection { share, reach_m, misnamed }))
     }
 }
 

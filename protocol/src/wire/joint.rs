@@ -212,6 +212,18 @@ pub(super) struct WireContradiction {
     last_ns: i64,
 }
 
+/// A landmark and where it is said to be.
+#[derive(Serialize, Deserialize)]
+pub(super) struct WireStated(pub u32, pub [f64; 2]);
+
+impl TryFrom<WireStated> for (LandmarkId, [f64; 2]) {
+    type Error = ProtocolError;
+
+    fn try_from(WireStated(id, place): WireStated) -> Result<Self, ProtocolError> {
+        Ok((LandmarkId(id), check::pair("stated", place)?))
+    }
+}
+
 #[derive(Serialize, Deserialize)]
 enum WireParty {
     Robot(u32),

@@ -3,12 +3,12 @@
 use pleiad_estimation::fact::{ClockMap, Entry, EntryId, Fingerprint, LogId, Noise, Seal, Vote};
 use pleiad_estimation::joint::{Contradiction, ErrorForm, Joint, JointParts, Tie};
 use pleiad_estimation::ledger::{Checkpoint, FactCounts, LogBase, Term, Views};
-use pleiad_estimation::{BootIndex, RobotId, Timestamp};
+use pleiad_estimation::{BootIndex, LandmarkId, RobotId, Timestamp};
 use serde::{Deserialize, Serialize};
 
 use super::entry::{WireEntry, WireId, WireLog, WireNoise};
 use super::joint::{
-    WireBlock, WireContradiction, WireNumber, WireTie, wire_block, wire_contradiction, wire_tie,
+    WireBlock, WireContradiction, WireNumber, WireStated, WireTie, wire_block, wire_contradiction, wire_tie,
 };
 use super::membership::{WireSeal, WireVote};
 use crate::codec::{self, Reader};
@@ -177,6 +177,7 @@ pub fn encode(checkpoint: &Checkpoint) -> Vec<u8> {
     codec::put_list(&mut bytes, parts.lower.iter().map(|entry| WireNumber(*entry)));
     codec::put_list(&mut bytes, parts.ties.iter().map(wire_tie));
     codec::put_list(&mut bytes, parts.contradictions.iter().map(wire_contradiction));
+    codec::put_list(&mut bytes, parts.stated.iter().map(|(id, place)| WireStated(id.0, *place)));
     let logs = checkpoint.logs.iter();
     codec::put_list(
         &mut bytes,
@@ -229,9 +230,10 @@ pub fn decode(bytes: &[u8]) -> Result<Checkpoint, ProtocolError> {
     let lower = reader.list::<WireNumber, f64>("snapshot.covariance", most)?;
     let ties = reader.list::<WireTie, Tie>("snapshot.ties", most)?;
     let contradictions = reader.list::<WireContradiction, Contradiction>("snapshot.contradictions", most)?;
+    let stated = reader.list::<WireStated, (LandmarkId, [f64; 2])>("snapshot.stated", most)?;
     let found = lower.len() as u64;
     let form = if head.additive { ErrorForm::Additive } else { ErrorForm::Invariant };
-    let parts = JointParts { blocks, lower, ties, contradictions, updates: head.updates };
+    let parts = JointParts { blocks, lower, ties, contradictions, stated, updates: head.updates };
     let limit = (3 * parts.blocks.len() * (3 * parts.blocks.len() + 1) / 2) as u64;
     let joint = Joint::from_parts(form, parts).ok_or(ProtocolError::TooMany {
         field: "snapshot.covariance".into(),

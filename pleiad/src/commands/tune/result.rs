@@ -322,8 +322,11 @@ fn files(
             sensors: agent.sensors.clone(),
             calibration: None,
         };
-        noise.filter.clutter =
-            clutter.map(|(share, reach_m)| pleiad_agent::config::ClutterSection { share, reach_m });
+        noise.filter.clutter = clutter.map(|(share, reach_m)| pleiad_agent::config::ClutterSection {
+            share,
+            reach_m,
+            misnamed: 0.0,
+        });
         levels::write(&tuned.rounded(), &mut noise.motion, &mut noise.sensors);
         (robot.to_string(), noise)
     };
