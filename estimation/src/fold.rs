@@ -108,8 +108,8 @@ pub enum Outcome {
     Placed,
     /// The joint was updated.
     Used,
-    /// The joint was updated, and that it was of another landmark than it says is the likeliest.
-    UsedAs(LandmarkId),
+    /// The joint was updated, and that it was of another than it names is the likeliest.
+    UsedAs(Party),
     /// It was seen between two frames of which it is not yet known how they lie to one another, and waits for more.
     Tied,
     /// It was the last that was needed to know how two frames lie to one another.
@@ -147,9 +147,23 @@ impl Residual {
 
 /// The joint that `facts`, in the order of their keys, make of nothing.
 pub fn joint_of(config: &FoldConfig, facts: &[(FactKey, Fact)]) -> Joint {
+    joint_among(config, facts, &nobody)
+}
+
+/// The same where others than those that sightings name have said where they were.
+pub fn joint_among(config: &FoldConfig, facts: &[(FactKey, Fact)], others: &Others<'_>) -> Joint {
     let mut joint = Joint::new(config.form);
-    fold_on(&mut joint, config, facts, &mut |_, _| {});
+    fold_on(&mut joint, config, facts, others, &mut |_, _| {});
     joint
+}
+
+/// Where other robots than the one that a sighting names were at its time, on which boot; of use where names may be wrong
+/// (`FoldConfig::misnamed`).
+pub type Others<'a> = dyn Fn(EntryId, RobotId) -> Option<(BootIndex, NominalState)> + 'a;
+
+/// Nobody but who is named has said where it was.
+pub fn nobody(_: EntryId, _: RobotId) -> Option<(BootIndex, NominalState)> {
+    None
 }
 
 /// Folds all of `facts`, in the order of their keys, into the joint state, and tells what became of each.
@@ -157,6 +171,7 @@ pub fn fold_on(
     joint: &mut Joint,
     config: &FoldConfig,
     facts: &[(FactKey, Fact)],
+    others: &Others<'_>,
     told: &mut dyn FnMut(&FactKey, Residual),
 ) {
     if let Some(how) = &config.relinearize {
@@ -164,7 +179,7 @@ pub fn fold_on(
         fold_blocks(joint, config, how, facts, &mut |_, _| {}, &mut told);
     } else {
         for (key, fact) in facts {
-            told(key, fold(joint, config, key, fact));
+            told(key, fold_among(joint, config, key, fact, others));
         }
     }
 }
@@ -172,6 +187,17 @@ pub fn fold_on(
 /// Folds one fact into the joint state, linearized where those before it put the robots, whatever the configuration says
 /// of linearizing facts together.
 pub fn fold(joint: &mut Joint, config: &FoldConfig, key: &FactKey, fact: &Fact) -> Residual {
+    fold_among(joint, config, key, fact, &nobody)
+}
+
+/// The same where others than the one that a sighting names have said where they were.
+pub fn fold_among(
+    joint: &mut Joint,
+    config: &FoldConfig,
+    key: &FactKey,
+    fact: &Fact,
+    others: &Others<'_>,
+) -> Residual {
     match fact {
         Fact::Boot(boot) => {
             joint.boot(key.id.robot, key.id.boot, boot);
@@ -182,7 +208,7 @@ pub fn fold(joint: &mut Joint, config: &FoldConfig, key: &FactKey, fact: &Fact) 
         }
         Fact::Observation { quantity, noise, observer, other } => {
             let seen = other.as_ref();
-            fold_observation(joint, config, key, quantity, noise.as_ref(), observer, seen)
+            fold_observation(joint, (config, others), key, quantity, noise.as_ref(), observer, seen)
                 .unwrap_or_else(|reason| Residual::without_measurement(Outcome::Skipped(reason)))
         }
     }
@@ -190,7 +216,7 @@ pub fn fold(joint: &mut Joint, config: &FoldConfig, key: &FactKey, fact: &Fact) 
 
 fn fold_observation(
     joint: &mut Joint,
-    config: &FoldConfig,
+    (config, others): (&FoldConfig, &Others<'_>),
     key: &FactKey,
     quantity: &Quantity,
     noise: Option<&Noise>,
@@ -232,19 +258,28 @@ fn fold_observation(
         joint.map_landmark(*landmark, taken[0].0, mount, from, position, &spread);
         return Ok(Residual::without_measurement(Outcome::Placed));
     }
-    named::keep_stated(joint, config, quantity);
-    let (residual, weight) = match &config.clutter {
-        Some(clutter) if config.misnamed > 0.0 && named::claimed(quantity).is_some() => {
-            named::fold_named(joint, (config, clutter), quantity, &noise, (&taken, &poses, &influences))?
-        }
-        clutter => {
-            // Nobody but who is named answers: that it was another robot is as good as nothing.
-            let odds = clutter.map(|clutter| clutter.and(config.misnamed).log_odds(quantity));
-            let at = linearize(quantity, &poses)?;
-            let mut participants = participants(quantity, &taken, &influences, &at);
-            update(joint, config, &at, &noise, &mut participants, odds)?
-        }
-    };
+    if let Some(clutter) = config.clutter.filter(|_| config.misnamed > 0.0)
+        && named::is_named(quantity)
+    {
+        named::keep_stated(joint, quantity);
+        let own = named::Reading { quantity: *quantity, taken, poses, influences };
+        let folded = named::fold_named(joint, (config, &clutter, others), key, own, &noise)?;
+        let (Residual { dimension, nis, .. }, weight) = (folded.residual, folded.weight);
+        reflect(
+            joint,
+            config,
+            key.time,
+            &folded.of.quantity,
+            &folded.of.taken,
+            (dimension, nis, weight),
+            true,
+        );
+        return Ok(folded.residual);
+    }
+    let odds = config.clutter.map(|clutter| clutter.log_odds(quantity));
+    let at = linearize(quantity, &poses)?;
+    let mut participants = participants(quantity, &taken, &influences, &at);
+    let (residual, weight) = update(joint, config, &at, &noise, &mut participants, odds)?;
     reflect(joint, config, key.time, quantity, &taken, (residual.dimension, residual.nis, weight), true);
     Ok(residual)
 }

@@ -9,6 +9,7 @@ mod closure;
 mod counts;
 mod history;
 mod log;
+mod naming;
 #[cfg(feature = "planted")]
 mod planted;
 mod reading;
@@ -24,6 +25,7 @@ pub use closure::Wish;
 pub use counts::FactCounts;
 pub use history::SettledPoint;
 pub use log::{EarlierEntries, Log, LogDigest};
+use naming::Naming;
 #[cfg(feature = "planted")]
 pub use planted::Planted;
 pub use rules::Closure;
@@ -34,7 +36,7 @@ use crate::fact::{
     Answer, Body, Entry, EntryId, Fingerprint, LogId, Noise, NoiseRef, NominalState, Observation, Quantity,
     VoidReason, read_extension,
 };
-use crate::fold::{Fact, FactKey, FoldConfig, Relinearization, Residual, fold, fold_blocks};
+use crate::fold::{Fact, FactKey, FoldConfig, Relinearization, Residual, fold_among, fold_blocks};
 use crate::joint::Joint;
 use crate::{BootIndex, RobotId, Timestamp};
 
@@ -111,6 +113,7 @@ pub struct Ledger {
     /// two arrive.
     answers: BTreeMap<(EntryId, RobotId), (EntryId, Answer)>,
     void: BTreeMap<EntryId, VoidReason>,
+    naming: Naming,
     joint: Joint,
     /// The last fact in `joint`.
     folded: Option<FactKey>,
@@ -141,6 +144,7 @@ impl Ledger {
             pending: BTreeMap::new(),
             answers: BTreeMap::new(),
             void: BTreeMap::new(),
+            naming: Naming::default(),
             joint: Joint::new(config.form),
             folded: None,
             dirty: None,
@@ -270,6 +274,7 @@ impl Ledger {
                 if let Quantity::Robot { robot, .. } = observation.quantity {
                     self.pending.insert(id, *observation);
                     self.resolve(id, observation, robot);
+                    self.ask(id, observation);
                 } else {
                     self.complete(id, observation, None);
                 }
@@ -284,11 +289,12 @@ impl Ledger {
                 } else if id > slot.0 {
                     return;
                 }
-                // Only the robot that was seen can answer.
-                if let Some(observation) = self.observation(half.observation)
-                    && Self::names(&observation, id.robot)
-                {
-                    self.resolve(half.observation, &observation, id.robot);
+                // Only the robot that was seen can answer, unless names may be wrong.
+                if let Some(observation) = self.observation(half.observation) {
+                    if Self::names(&observation, id.robot) {
+                        self.resolve(half.observation, &observation, id.robot);
+                    }
+                    self.consider(half.observation, &observation, id.robot);
                 }
             }
         }
@@ -373,7 +379,9 @@ impl Ledger {
         }
         let after = self.folded.map_or(std::ops::Bound::Unbounded, std::ops::Bound::Excluded);
         for (key, record) in self.facts.range_mut((after, std::ops::Bound::Unbounded)) {
-            record.residual = Some(fold(&mut self.joint, &self.config, key, &record.fact));
+            let others = &self.naming.others;
+            let others = |id, robot| others.get(&(id, robot)).copied();
+            record.residual = Some(fold_among(&mut self.joint, &self.config, key, &record.fact, &others));
             self.folded = Some(*key);
             self.refolded += 1;
             self.snapshots.offer(*key, &self.joint);

@@ -129,7 +129,7 @@ impl Node {
     pub(super) fn empty_ledger(config: &crate::config::NodeConfig) -> Ledger {
         match &config.closing.closure {
             Some(closure) => Ledger::closing(config.fold, closure.clone(), config.robot),
-            None => Ledger::new(config.fold),
+            None => Ledger::new(config.fold).kept_for(config.robot),
         }
     }
 }

@@ -49,11 +49,6 @@ impl Clutter {
         libm::log(self.share / (1.0 - self.share)) - self.log_volume(quantity)
     }
 
-    /// With a further share that is as good as nothing.
-    pub(super) fn and(self, share: f64) -> Self {
-        Self { share: (self.share + share).min(0.5 * (1.0 + self.share)), ..self }
-    }
-
     /// Logarithm of the volume of the readings that a sensor can give.
     pub(crate) fn log_volume(&self, quantity: &Quantity) -> f64 {
         let disc = std::f64::consts::PI * self.reach_m * self.reach_m;

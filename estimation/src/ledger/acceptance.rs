@@ -46,7 +46,13 @@ impl Ledger {
     /// Everything that is accepted is filed again, with `other` in the place of the entry of its identity.
     pub(super) fn rebuild(&mut self, other: Option<&Entry>) {
         let mut rebuilt = match &self.closing {
-            None => Self::new(self.config),
+            None => {
+                let rebuilt = Self::new(self.config);
+                match self.owner() {
+                    Some(owner) => rebuilt.kept_for(owner),
+                    None => rebuilt,
+                }
+            }
             Some(closing) => {
                 let (closure, base) = (closing.closure.clone(), closing.base.clone());
                 let mut rebuilt = Self::from_checkpoint(self.config, closure, closing.owner, base);

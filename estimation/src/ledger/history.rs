@@ -2,7 +2,7 @@
 
 use super::Ledger;
 use crate::fact::NominalState;
-use crate::fold::{Fact, FactKey, fold, fold_blocks};
+use crate::fold::{Fact, FactKey, fold_among, fold_blocks};
 use crate::joint::{Joint, RobotView};
 use crate::symmetric::Symmetric3;
 use crate::{BootIndex, Pose2, RobotId, Timestamp};
@@ -39,7 +39,8 @@ impl Ledger {
             return points;
         }
         for (key, record) in &self.facts {
-            fold(&mut joint, &self.config, key, &record.fact);
+            let others = |id, robot| self.naming.others.get(&(id, robot)).copied();
+            fold_among(&mut joint, &self.config, key, &record.fact, &others);
             add(&joint, key.time);
         }
         points

@@ -76,8 +76,8 @@ pub(super) fn noise_matrix(noise: &Noise) -> Option<DMatrix<f64>> {
 /// Entries may come in any order and repeatedly. Two different entries of one identity are an
 /// equivocation, of which the one with the smaller fingerprint counts. Of several answers to one
 /// observation the first in `(boot, sequence)` counts. Left out are observations of a robot that
-/// has not answered or answered void, and observations whose noise profile is not among the entries.
-pub fn facts_from_entries(entries: &[Entry]) -> Vec<ReferenceFact> {
+/// Entries by identity; of two with one identity the one with the smaller fingerprint.
+fn unique(entries: &[Entry]) -> BTreeMap<EntryId, Entry> {
     let mut unique: BTreeMap<EntryId, Entry> = BTreeMap::new();
     for entry in entries {
         let mut entry = entry.clone();
@@ -87,7 +87,27 @@ pub fn facts_from_entries(entries: &[Entry]) -> Vec<ReferenceFact> {
             *kept = entry;
         }
     }
+    unique
+}
 
+/// Where each robot that answered a sighting was, whether it was named or not: the entry with the smallest identity counts.
+pub fn halves_from_entries(entries: &[Entry]) -> BTreeMap<(EntryId, RobotId), (BootIndex, NominalState)> {
+    let mut answers = BTreeMap::new();
+    for (id, entry) in unique(entries) {
+        if let Body::Half(half) = entry.body {
+            answers.entry((half.observation, id.robot)).or_insert(half.answer);
+        }
+    }
+    let state = |(of, answer)| match answer {
+        Answer::State { boot, state } => Some((of, (boot, state))),
+        Answer::Void(_) => None,
+    };
+    answers.into_iter().filter_map(state).collect()
+}
+
+/// has not answered or answered void, and observations whose noise profile is not among the entries.
+pub fn facts_from_entries(entries: &[Entry]) -> Vec<ReferenceFact> {
+    let unique = unique(entries);
     let mut profiles = BTreeMap::new();
     let mut answers = BTreeMap::new();
     for (id, entry) in &unique {

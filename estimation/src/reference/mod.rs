@@ -17,7 +17,7 @@ mod per_tick;
 mod roumeliotis_bekey;
 pub mod spatial;
 
-pub use facts::{FactContent, Measurement, ReferenceFact, State, facts_from_entries};
+pub use facts::{FactContent, Measurement, ReferenceFact, State, facts_from_entries, halves_from_entries};
 pub use joint::JointCovariance;
 pub use joint_ekf::{DEFAULT_GATE, FactRecord, JointEkf, JointEstimate, RobotEstimate};
 pub use models::{ErrorForm, Linearized, Outcome, SkipReason, linearize};

@@ -93,7 +93,11 @@ pub struct World<'a> {
     pub known: bool,
     /// Share of sightings of landmarks that name another one.
     pub misnamed: f64,
-    /// The first two landmarks always go by each other's names.
+    /// Share of sightings of robots that name another one.
+    pub mistaken: f64,
+    /// Every robot answers every sighting.
+    pub all_answer: bool,
+    /// The first two landmarks, and the second robot and the third, always go by each other's names.
     pub swapped: bool,
     /// Share of sightings of robots that are of nothing: any range and any bearing.
     pub garbage: f64,
@@ -159,6 +163,8 @@ impl Default for World<'_> {
             landmarks: &[],
             known: false,
             misnamed: 0.0,
+            mistaken: 0.0,
+            all_answer: false,
             swapped: false,
             garbage: 0.0,
             slip: 1.0,
@@ -354,15 +360,28 @@ fn sight(
             (Relative::Pose(whole.compose(&Pose2::exp(Vector3::from(error)))), sigmas)
         }
     };
-    let quantity = Quantity::Robot { robot: RobotId(other as u32 + 1), relative };
-    let id = observation(&mut run.robots[observer], observer as u32 + 1, tick, quantity, sigmas);
-    let mut state = run.robots[other].trajectory.at(Timestamp(tick * TICK_NS)).expect("kept");
-    if let Some(Lie { answer_m, .. }) = world.lies(other, tick) {
-        state.nominal = Pose2::new(answer_m, 0.0, 0.0).compose(&state.nominal);
+    let mut named = other;
+    if world.swapped && [1, 2].contains(&other) && observer + other != 3 {
+        named = 3 - other;
     }
-    let answer = Answer::State { boot: BootIndex(0), state };
-    let extension = run.robots[other].extension(tick);
-    run.robots[other].say(other as u32 + 1, Body::Half(Half { observation: id, answer }), extension);
+    if world.mistaken > 0.0 && random.random::<f64>() < world.mistaken {
+        let wrong: Vec<usize> =
+            (0..run.robots.len()).filter(|robot| ![observer, other].contains(robot)).collect();
+        named = wrong[random.random_range(0..wrong.len())];
+    }
+    let quantity = Quantity::Robot { robot: RobotId(named as u32 + 1), relative };
+    let id = observation(&mut run.robots[observer], observer as u32 + 1, tick, quantity, sigmas);
+    for robot in 0..run.robots.len() {
+        if robot == named || (world.all_answer && robot != observer) {
+            let mut state = run.robots[robot].trajectory.at(Timestamp(tick * TICK_NS)).expect("kept");
+            if let Some(Lie { answer_m, .. }) = world.lies(robot, tick) {
+                state.nominal = Pose2::new(answer_m, 0.0, 0.0).compose(&state.nominal);
+            }
+            let answer = Answer::State { boot: BootIndex(0), state };
+            let extension = run.robots[robot].extension(tick);
+            run.robots[robot].say(robot as u32 + 1, Body::Half(Half { observation: id, answer }), extension);
+        }
+    }
 }
 
 impl Run {

@@ -8,7 +8,7 @@ use pleiad_estimation::fact::{
 };
 use pleiad_estimation::fold::FoldConfig;
 use pleiad_estimation::joint::Joint;
-use pleiad_estimation::reference::facts_from_entries;
+use pleiad_estimation::reference::{facts_from_entries, halves_from_entries};
 use pleiad_estimation::{BootIndex, RobotId, Timestamp};
 
 use super::oracle;
@@ -275,7 +275,9 @@ impl Checks {
             let what = format!("{observed} observations were made, {counted} are counted: {counts:?}");
             return Err(self.violation(robot, what));
         }
-        oracle::agrees(ledger.joint(), &facts_from_entries(&entries), fold)
+        let halves = halves_from_entries(&entries);
+        let others = |id, robot| halves.get(&(id, robot)).copied();
+        oracle::agrees(ledger.joint(), &facts_from_entries(&entries), &others, fold)
             .map_err(|what| self.violation(robot, what))
     }
 }

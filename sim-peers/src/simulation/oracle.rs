@@ -1,7 +1,7 @@
 //! The estimate of a ledger against the oracle's on the same facts.
 
 use pleiad_estimation::RobotId;
-use pleiad_estimation::fold::FoldConfig;
+use pleiad_estimation::fold::{FoldConfig, Others};
 use pleiad_estimation::geometry::Matrix3;
 use pleiad_estimation::joint::{Block, ErrorForm, Joint};
 use pleiad_estimation::reference::{self, JointEkf, JointEstimate, ReferenceFact};
@@ -16,11 +16,16 @@ const TOLERANCE: f64 = 1e-9;
 const ROUNDINGS: f64 = 4.0;
 
 /// Whether a ledger believes what the oracle does, or what is off.
-pub fn agrees(joint: &Joint, facts: &[ReferenceFact], fold: &FoldConfig) -> Result<(), String> {
+pub fn agrees(
+    joint: &Joint,
+    facts: &[ReferenceFact],
+    others: &Others<'_>,
+    fold: &FoldConfig,
+) -> Result<(), String> {
     let parameters = |block: &Block| !matches!(block, Block::Robot(_));
     let more = fold.clutter.is_some() || fold.inflation.is_some() || fold.quarantine.is_some();
     if fold.relinearize.is_some() || more || joint.blocks().iter().any(parameters) {
-        return at_once(joint, &folded(facts, fold));
+        return at_once(joint, &folded(facts, fold, others));
     }
     let form = match fold.form {
         ErrorForm::Invariant => reference::ErrorForm::Invariant,
@@ -41,7 +46,10 @@ pub fn agrees(joint: &Joint, facts: &[ReferenceFact], fold: &FoldConfig) -> Resu
     let mut by_rounding = |apart: &dyn Fn(&Joint, &JointEstimate, f64) -> f64| {
         let other = rounding.get_or_insert_with(|| {
             let facts = UNITS.map(|scale| in_units(facts, scale));
-            (facts.each_ref().map(|facts| folded(facts, fold)), facts.each_ref().map(|facts| ekf.fold(facts)))
+            (
+                facts.each_ref().map(|facts| folded(facts, fold, others)),
+                facts.each_ref().map(|facts| ekf.fold(facts)),
+            )
         });
         let moved = UNITS.iter().zip(other.0.iter().zip(&other.1));
         ROUNDINGS * moved.map(|(scale, (ours, theirs))| apart(ours, theirs, *scale)).fold(0.0, f64::max)

@@ -36,7 +36,12 @@ pub fn config(plan: &Plan, robot: u32, start: &Pose2) -> Result<NodeConfig, Stri
     let mut unknown = "";
     if plan.calibrate {
         filter.push_str("join = true\n");
-        filter.push_str("clutter = { share = 0.05, reach_m = 30.0 }\n");
+        // Where facts are linearized together, names are taken for right.
+        filter.push_str(if plan.relinearize {
+            "clutter = { share = 0.05, reach_m = 30.0 }\n"
+        } else {
+            "clutter = { share = 0.05, reach_m = 30.0, misnamed = 0.05 }\n"
+        });
         // Low enough that robots are found to contradict each other every now and then.
         filter.push_str("inflation = {}\nquarantine = { level = 1.0 }\n");
         filter.push_str("[calibration]\nsigma_forward_scale = 0.05\nsigma_yaw_scale = 0.05\n");

@@ -3,7 +3,7 @@
 
 use pleiad_estimation::Pose2;
 use pleiad_estimation::fact::{Absolute, Boot, Noise, NominalState, Quantity};
-use pleiad_estimation::fold::{Fact, FactKey, FoldConfig, joint_of};
+use pleiad_estimation::fold::{Fact, FactKey, FoldConfig, Others, joint_among};
 use pleiad_estimation::joint::Joint;
 use pleiad_estimation::reference::{FactContent, Measurement, ReferenceFact};
 use pleiad_estimation::sample::Relative;
@@ -100,7 +100,7 @@ pub fn in_units(facts: &[ReferenceFact], scale: f64) -> Vec<ReferenceFact> {
 }
 
 /// The facts folded as the ledger does it.
-pub fn folded(facts: &[ReferenceFact], config: &FoldConfig) -> Joint {
+pub fn folded(facts: &[ReferenceFact], config: &FoldConfig, others: &Others<'_>) -> Joint {
     let mut sorted: Vec<&ReferenceFact> = facts.iter().collect();
     sorted.sort_by_key(|fact| fact.order());
     let facts = sorted.into_iter().map(|fact| match &fact.content {
@@ -113,5 +113,5 @@ pub fn folded(facts: &[ReferenceFact], config: &FoldConfig) -> Joint {
             (FactKey::observation(fact.time, fact.id), content)
         }
     });
-    joint_of(config, &facts.collect::<Vec<_>>())
+    joint_among(config, &facts.collect::<Vec<_>>(), others)
 }

@@ -22,7 +22,8 @@ impl Ledger {
             .inspect(|(_, record)| counts.add(record))
             .map(|(key, record)| (*key, record.fact))
             .collect();
-        fold_on(&mut joint, &self.config, &closed, &mut |_, _| {});
+        let others = |id, robot| self.naming.others.get(&(id, robot)).copied();
+        fold_on(&mut joint, &self.config, &closed, &others, &mut |_, _| {});
         let lost = self.pending.values().filter(|observation| observation.time <= cut).count();
         counts.expired += lost;
         counts.void += self.void.keys().filter(|id| self.time_of(**id).is_some_and(|t| t <= cut)).count();
@@ -255,6 +256,7 @@ impl Ledger {
         }
         let answers = std::mem::take(&mut self.answers);
         self.answers = answers.into_iter().filter(|((id, _), _)| !self.is_over(*id)).collect();
+        self.forget_answered(cut);
         let void = std::mem::take(&mut self.void);
         self.void = void.into_iter().filter(|(id, _)| !self.is_over(*id)).collect();
         self.release();

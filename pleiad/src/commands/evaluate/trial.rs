@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, bail};
 use pleiad_estimation::fact::{EntryId, NominalState, Quantity};
-use pleiad_estimation::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, fold_on};
+use pleiad_estimation::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, fold_on, nobody};
 use pleiad_estimation::geometry::wrap_angle;
 use pleiad_estimation::joint::Joint;
 use pleiad_estimation::strategy::{Deviation, joint_of_replica};
@@ -92,12 +92,12 @@ fn score(
         // What later facts would move must not be in it.
         let held = facts.partition_point(|(key, _)| key.time <= *time);
         let mut joint = Joint::new(config.form);
-        fold_on(&mut joint, config, &facts[..held], &mut |_, _| {});
+        fold_on(&mut joint, config, &facts[..held], &nobody, &mut |_, _| {});
         joints.push(joint);
     }
     score.seconds = begun.elapsed().as_secs_f64();
     let mut residuals: BTreeMap<EntryId, Residual> = BTreeMap::new();
-    fold_on(&mut Joint::new(config.form), config, facts, &mut |key, residual| {
+    fold_on(&mut Joint::new(config.form), config, facts, &nobody, &mut |key, residual| {
         residuals.insert(key.id, residual);
     });
     innovations(&mut score, facts, &residuals);
