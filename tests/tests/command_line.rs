@@ -20,6 +20,8 @@ mod help;
 mod json;
 #[path = "command_line/models.rs"]
 mod models;
+#[path = "command_line/named.rs"]
+mod named;
 #[path = "command_line/simulate.rs"]
 mod simulate;
 #[path = "command_line/standing.rs"]

@@ -82,6 +82,7 @@ pub fn gaussian(random: &mut ChaCha8Rng) -> f64 {
 
 /// What a team may see.
 #[derive(Clone, Copy)]
+#[allow(clippy::struct_excessive_bools, reason = "each is one thing that may be so")]
 pub struct World<'a> {
     /// The first robot has GPS.
     pub gps: bool,
