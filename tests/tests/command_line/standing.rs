@@ -61,7 +61,7 @@ fn replay(within: &Path, more: &[&str], out: &str) -> Value {
     run(within, ["replay", "recording", "--json", "--out", out].iter().chain(more)).json()
 }
 
-fn said<'a>(replayed: &'a Value, robot: u64) -> Option<&'a Value> {
+fn said(replayed: &Value, robot: u64) -> Option<&Value> {
     replayed["found"]["robots"].as_array()?.iter().find(|of| of["robot"] == robot)
 }
 
