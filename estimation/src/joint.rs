@@ -4,8 +4,8 @@ mod block;
 mod boots;
 mod component;
 mod covariance;
-mod mixed;
 mod standing;
+mod updates;
 mod view;
 
 pub use block::{Block, MappedLandmark, Member, ParameterKind, Parameters};
@@ -389,61 +389,6 @@ impl Joint {
         if let Some(index) = self.index(robot) {
             self.propagate(index, state);
         }
-    }
-
-    /// One update of the whole joint with an innovation of `dimension` and the given noise, if it passes
-    /// the gate.
-    pub(crate) fn update(
-        &mut self,
-        dimension: usize,
-        innovation: &Vector3,
-        noise: &Matrix3,
-        participants: &mut [Participant],
-        threshold: f64,
-        clutter: Option<f64>,
-    ) -> Update {
-        if self.form == ErrorForm::Additive {
-            for participant in participants.iter_mut() {
-                let member = self.part(participant.index);
-                let pose = member.correction.compose(&member.nominal);
-                participant.jacobian *= pose.invariant_from_additive();
-            }
-        }
-        let Some(prepared) = self.covariance.prepare(dimension, innovation, noise, participants) else {
-            return Update::Indefinite;
-        };
-        let nis = prepared.nis();
-        let weight = clutter.map_or(1.0, |odds| prepared.weight_in_clutter(odds));
-        if nis > threshold {
-            return Update::Rejected { nis, threshold, weight };
-        }
-        self.updates += 1;
-        if clutter.is_some() {
-            self.update_in_clutter(&prepared, weight);
-            return Update::Used { nis, weight };
-        }
-        self.covariance.downdate(&prepared);
-        for index in 0..self.blocks.len() {
-            self.correct(index, prepared.correction(index));
-        }
-        Update::Used { nis, weight }
-    }
-
-    /// An update with a measurement that may be of nothing: the mixture of both, with its mean and covariance
-    /// (`barshalom1975`); `weight` is the probability that it is not.
-    fn update_in_clutter(&mut self, prepared: &Prepared, weight: f64) {
-        self.reduce_in_clutter(prepared, weight);
-        for index in 0..self.blocks.len() {
-            self.correct(index, prepared.correction(index) * weight);
-        }
-    }
-
-    /// The covariance of an update that is of nothing but for a `weight`; the corrections are left.
-    pub(crate) fn reduce_in_clutter(&mut self, prepared: &Prepared, weight: f64) {
-        let deltas: Vec<f64> =
-            (0..self.blocks.len()).flat_map(|index| <[f64; 3]>::from(prepared.correction(index))).collect();
-        self.covariance.downdate(&prepared.scaled(weight.sqrt()));
-        self.covariance.add_outer(&deltas, weight * (1.0 - weight));
     }
 
     /// Takes an error found into what it is the error of.

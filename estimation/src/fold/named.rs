@@ -1,6 +1,7 @@
 //! Sightings whose name may be another's: each robot and landmark is held against what was seen, with its probability.
 
-use super::{Influence, Others, Outcome, Residual, SkipReason, Taken, linearize, participants, seen_poses};
+use super::reading::{Influence, dimension, linearize, participants, seen_poses};
+use super::{Others, Outcome, Residual, SkipReason, Taken};
 use crate::fact::Quantity;
 use crate::fold::{Clutter, FactKey, FoldConfig};
 use crate::geometry::{Matrix3, Vector3};
@@ -89,7 +90,7 @@ pub(super) fn fold_named(
     let party = Party::of(&best.of.quantity);
     let residual = Residual {
         outcome: if party == named { Outcome::Used } else { Outcome::UsedAs(party) },
-        dimension: super::dimension(&best.of.quantity),
+        dimension: dimension(&best.of.quantity),
         innovation: best.innovation,
         nis: best.prepared.nis(),
     };
