@@ -18,8 +18,9 @@ pub enum RecordingError {
     },
     /// The path holds neither form of recording, or both at once.
     #[error(
-        "{} is not a recording: {found}; expected either a recording folder (r1/, r2/, ... with their .csv \
-         channels) or an MRCLAM folder (Robot1_Odometry.dat, ...)", path.display()
+        "{} is not a recording: {found}; expected a recording folder (r1/, r2/, ... with their .csv channels), an \
+         MRCLAM folder (Robot1_Odometry.dat, ...), an .mcap file that Pleiad wrote, or a ROS 2 bag (.mcap) or .csv \
+         files with a mapping", path.display()
     )]
     NotARecording {
         /// The path asked for.
@@ -117,6 +118,56 @@ pub enum RecordingError {
         found: String,
         /// What should be there.
         expected: String,
+    },
+    /// A file that is no whole MCAP file.
+    #[error(
+        "{} cannot be read as MCAP: {message}; if it was cut short, `mcap recover` of the MCAP tools saves what is \
+         whole", file.display()
+    )]
+    Mcap {
+        /// The file.
+        file: PathBuf,
+        /// What the reader says.
+        message: String,
+    },
+    /// A message that cannot be used.
+    #[error("{}: topic {topic}, message {number}: found {found}, expected {expected}; {remedy}", file.display())]
+    BadMessage {
+        /// The file.
+        file: PathBuf,
+        /// The topic.
+        topic: String,
+        /// Which of the topic's messages, counted from 1.
+        number: usize,
+        /// What is in it.
+        found: String,
+        /// What should be.
+        expected: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A bag or folder of which nobody said what is what in it.
+    #[error(
+        "{}: there is no mapping that says which of its topics are which channels; name one with --mapping, or write \
+         {} (docs/interchange.md). {holds}", file.display(), beside.display()
+    )]
+    NoMapping {
+        /// The bag.
+        file: PathBuf,
+        /// Where one is looked for.
+        beside: PathBuf,
+        /// The topics with their types.
+        holds: String,
+    },
+    /// A mapping that names a topic that the bag does not have, or asks of it what it does not hold.
+    #[error("{}: {place}: {problem}", mapping.display())]
+    Mapping {
+        /// The mapping.
+        mapping: PathBuf,
+        /// Its table, as in `topic[2] (/robot1/odom)`.
+        place: String,
+        /// What was found, what was expected, and what to do.
+        problem: String,
     },
     /// The recording in memory has no faithful form on disk.
     #[error("the recording cannot be written: {reason}")]

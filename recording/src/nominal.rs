@@ -136,13 +136,22 @@ const ROBOT: &[Key<NominalRobot>] = keys! { NominalRobot;
 /// in for it; the model or the version is unknown.
 pub fn read_nominal(path: &Path, warnings: &mut Vec<String>) -> Result<Option<Nominal>, RecordingError> {
     let Some(table) = load_toml(path)? else { return Ok(None) };
+    nominal_of(path, &table, warnings).map(Some)
+}
+
+/// What the table of a `nominal.toml` says; `path` is for messages.
+pub(crate) fn nominal_of(
+    path: &Path,
+    table: &Table,
+    warnings: &mut Vec<String>,
+) -> Result<Nominal, RecordingError> {
     let mut reader = Reader { path, file: file_name(path), warnings };
-    reader.head(&table)?;
-    let noise = reader.section(&table, "noise", "noise", NOISE, |_, _, _| Ok(false))?;
+    reader.head(table)?;
+    let noise = reader.section(table, "noise", "noise", NOISE, |_, _, _| Ok(false))?;
     let range_sensor =
-        reader.section(&table, "range_sensor", "range_sensor", RANGE_SENSOR, |_, _, _| Ok(false))?;
-    let team_drive = extras::drive(&table).map_err(|wrong| reader.wrong("", wrong))?;
-    let robots_table = reader.table(&table, "robots", "robots")?;
+        reader.section(table, "range_sensor", "range_sensor", RANGE_SENSOR, |_, _, _| Ok(false))?;
+    let team_drive = extras::drive(table).map_err(|wrong| reader.wrong("", wrong))?;
+    let robots_table = reader.table(table, "robots", "robots")?;
     let mut robots = BTreeMap::new();
     for name in robots_table.keys() {
         let section = format!("robots.{name}");
@@ -156,7 +165,7 @@ pub fn read_nominal(path: &Path, warnings: &mut Vec<String>) -> Result<Option<No
         read.effects = extras::effects(own).map_err(|wrong| reader.wrong(&section, wrong))?;
         robots.insert(robot, read);
     }
-    Ok(Some(Nominal { noise, range_sensor, robots }))
+    Ok(Nominal { noise, range_sensor, robots })
 }
 
 /// Channel rates go by the suffix of their keys; drive and effects are read apart; `Ok(false)` for any other

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use pleiad_estimation::sample::{Reading, Target};
 
+use crate::bag;
 use crate::error::RecordingError;
 use crate::folder;
 use crate::ingest::ReadOptions;
@@ -12,24 +13,56 @@ use crate::mrclam;
 use crate::report::{Form, IngestReport};
 use crate::types::Recording;
 
-/// Reads the recording in the folder `path`, of whichever form its files are.
+/// A recording that was read.
+#[derive(Clone, Debug)]
+pub struct Opened {
+    /// The recording.
+    pub recording: Recording,
+    /// What was found besides.
+    pub report: IngestReport,
+    /// Texts that lie within an MCAP file, by name: noise, start and model of the robots.
+    pub attachments: BTreeMap<String, String>,
+}
+
+/// Reads the recording in `path`, of whichever form it is; of foreign files, the mapping beside them says what is
+/// what.
 ///
 /// # Errors
-/// `path` holds no recording, or files of both forms; whatever [`crate::read_folder`] and
-/// [`crate::read_mrclam`] refuse.
+/// See [`open_mapped`].
 pub fn open(path: &Path, options: &ReadOptions) -> Result<(Recording, IngestReport), RecordingError> {
+    open_mapped(path, None, options).map(|opened| (opened.recording, opened.report))
+}
+
+/// Reads the recording in `path`: a recording folder, an MRCLAM folder, an MCAP file that Pleiad wrote; or, through
+/// `mapping` (`mapping.toml` beside the files if `None`), a ROS 2 bag or files of comma-separated values.
+///
+/// # Errors
+/// `path` holds no recording, or several forms at once; files that are damaged, or that the mapping does not fit.
+pub fn open_mapped(
+    path: &Path,
+    mapping: Option<&Path>,
+    options: &ReadOptions,
+) -> Result<Opened, RecordingError> {
     let refused = |found: &str| {
         Err(RecordingError::NotARecording { path: path.to_path_buf(), found: found.to_owned() })
     };
     if !path.exists() {
-        return refused("there is no such folder");
+        return refused("there is no such folder or file");
+    }
+    if mapping.is_some() {
+        return bag::open(path, mapping, options);
     }
     if !path.is_dir() {
-        return refused("it is a file");
+        return match path.extension().and_then(|ending| ending.to_str()) {
+            Some("mcap" | "csv") => bag::open(path, None, options),
+            _ => refused("it is a file, and neither .mcap nor .csv"),
+        };
     }
+    let whole = |(recording, report)| Opened { recording, report, attachments: BTreeMap::new() };
     match forms_of(path)?.as_slice() {
-        [Form::Folder] => folder::read_folder(path, options),
-        [Form::Mrclam] => mrclam::read_mrclam(path, options),
+        [Form::Folder] => folder::read_folder(path, options).map(whole),
+        [Form::Mrclam] => mrclam::read_mrclam(path, options).map(whole),
+        [] if bag::is_mapped(path)? => bag::open(path, None, options),
         [] => refused("it holds no robot"),
         _ => refused("it holds files of both forms, and which is meant is not told by guessing"),
     }

@@ -19,6 +19,12 @@ pub enum Form {
     Folder,
     /// A folder of the UTIAS multi-robot data set.
     Mrclam,
+    /// An MCAP file that Pleiad wrote.
+    Mcap,
+    /// A ROS 2 bag through a mapping.
+    Bag,
+    /// Files of comma-separated values through a mapping.
+    Csv,
 }
 
 /// What was found while reading; nothing is dropped, reordered or assumed without standing here.
@@ -38,7 +44,7 @@ pub struct IngestReport {
 /// `rows = kept + skipped + duplicates + conflicts + unknown barcodes`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FileReport {
-    /// The file, from the recording's folder.
+    /// The file, from the recording's folder; the topic of a bag.
     pub file: String,
     /// Data rows found; neither header, comments nor blank lines.
     pub rows: usize,
@@ -153,10 +159,14 @@ impl fmt::Display for IngestReport {
         let form = match self.form {
             Form::Folder => "recording folder",
             Form::Mrclam => "MRCLAM folder",
+            Form::Mcap => "MCAP file",
+            Form::Bag => "ROS 2 bag",
+            Form::Csv => "CSV files",
         };
         let rows: usize = self.files.iter().map(|file| file.rows).sum();
         let kept: usize = self.files.iter().map(|file| file.kept).sum();
-        write!(f, "{form}: {} files, {kept} of {rows} rows kept", self.files.len())?;
+        let parts = if matches!(self.form, Form::Mcap | Form::Bag) { "topics" } else { "files" };
+        write!(f, "{form}: {} {parts}, {kept} of {rows} rows kept", self.files.len())?;
         self.line(f, "bad rows skipped", |file| file.skipped)?;
         for file in &self.files {
             if let Some(row) = file.first_skipped.first() {

@@ -33,7 +33,7 @@ pub(crate) struct Table {
     /// Number of cells in every row.
     width: usize,
     /// The columns asked for, and where each is.
-    wanted: Vec<&'static str>,
+    wanted: Vec<String>,
     cells: Vec<Option<usize>>,
 }
 
@@ -61,8 +61,8 @@ impl Table {
     pub(crate) fn open_csv(
         root: &Path,
         file: &str,
-        required: &[&'static str],
-        optional: &[&'static str],
+        required: &[&str],
+        optional: &[&str],
     ) -> Result<Option<Self>, RecordingError> {
         let path = root.join(file);
         let Some(bytes) = load(&path)? else { return Ok(None) };
@@ -70,7 +70,7 @@ impl Table {
         let header = lines.by_ref().find(|(_, text)| is_data(text));
         let (line, text) = header.unwrap_or((lines.number.max(1), b""));
         let names: Vec<&str> = text.split(|&byte| byte == b',').map(str_or_empty).collect();
-        let wanted: Vec<&'static str> = required.iter().chain(optional).copied().collect();
+        let wanted: Vec<String> = required.iter().chain(optional).map(ToString::to_string).collect();
         let refused = |expected: String| RecordingError::BadHeader {
             file: path.clone(),
             line,
@@ -83,13 +83,17 @@ impl Table {
             }
         }
         for name in &wanted {
-            if names.iter().filter(|column| *column == name).count() > 1 {
+            if names.iter().filter(|column| **column == name.as_str()).count() > 1 {
                 return Err(refused(format!("column `{name}` only once")));
             }
         }
-        let cells = wanted.iter().map(|name| names.iter().position(|column| column == name)).collect();
-        let unknown_columns =
-            names.iter().filter(|name| !wanted.contains(name)).map(ToString::to_string).collect();
+        let cells =
+            wanted.iter().map(|name| names.iter().position(|column| *column == name.as_str())).collect();
+        let unknown_columns = names
+            .iter()
+            .filter(|name| !wanted.iter().any(|own| own == *name))
+            .map(ToString::to_string)
+            .collect();
         Ok(Some(Self {
             file: file.to_owned(),
             unknown_columns,
@@ -108,7 +112,7 @@ impl Table {
     pub(crate) fn open_columns(
         root: &Path,
         file: &str,
-        names: &[&'static str],
+        names: &[&str],
     ) -> Result<Option<Self>, RecordingError> {
         let path = root.join(file);
         let Some(bytes) = load(&path)? else { return Ok(None) };
@@ -121,7 +125,7 @@ impl Table {
             lines_before: 0,
             separator: Separator::Whitespace,
             width: names.len(),
-            wanted: names.to_vec(),
+            wanted: names.iter().map(ToString::to_string).collect(),
             cells: (0..names.len()).map(Some).collect(),
         }))
     }
@@ -205,7 +209,7 @@ impl<'t> Row<'t> {
     }
 
     fn expected(&self, column: usize, what: &str) -> String {
-        let name = self.table.wanted.get(column).copied().unwrap_or_default();
+        let name = self.table.wanted.get(column).map(String::as_str).unwrap_or_default();
         format!("{what} in column `{name}`, not `{}`", shown(self.cell(column)))
     }
 

@@ -4,7 +4,7 @@ use pleiad_estimation::Timestamp;
 use pleiad_estimation::sample::{Reading, Relative, Sample};
 
 use crate::report::{FileReport, Gaps};
-use crate::types::{BeamSample, Command, SteerSample, TruthSample};
+use crate::types::{BeamSample, Command, RobotRecording, SteerSample, TruthSample};
 
 /// A row with a stamp.
 pub(crate) trait Stamped: Copy + PartialEq {
@@ -98,6 +98,23 @@ pub(crate) fn tidy<T: Stamped>(rows: &mut Vec<T>, report: &mut FileReport) {
     rows.truncate(kept);
     report.kept = kept;
     report.gaps = gaps(rows);
+}
+
+/// Tidies every channel of `robot`, each into the report that `reports` has for it by the channel's name.
+pub(crate) fn tidy_robot(robot: &mut RobotRecording, reports: Vec<(&str, &mut FileReport)>) {
+    for (name, report) in reports {
+        match name {
+            "command" => tidy(&mut robot.commands, report),
+            "gyro" => tidy(&mut robot.gyro, report),
+            "gps" => tidy(&mut robot.gps, report),
+            "heading" => tidy(&mut robot.heading, report),
+            "relative" => tidy(&mut robot.sightings, report),
+            "steer" => tidy(&mut robot.steer, report),
+            "scan" => tidy(&mut robot.scans, report),
+            "truth" => tidy(&mut robot.truth, report),
+            _ => tidy(&mut robot.odometry, report),
+        }
+    }
 }
 
 fn gaps<T: Stamped>(sorted: &[T]) -> Gaps {

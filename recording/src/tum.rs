@@ -82,7 +82,7 @@ fn pose(row: &Row<'_>) -> Result<(Timestamp, Pose2), String> {
 }
 
 /// The yaw of a rotation; for a level one twice the half angle, which loses no digits.
-fn yaw(qx: f64, qy: f64, qz: f64, qw: f64) -> f64 {
+pub(crate) fn yaw(qx: f64, qy: f64, qz: f64, qw: f64) -> f64 {
     if qx == 0.0 && qy == 0.0 {
         // The same rotation has two quaternions; the one with a half angle within a quarter turn.
         let half = if qw < 0.0 { (-qz).atan2(-qw) } else { qz.atan2(qw) };

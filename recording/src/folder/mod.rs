@@ -3,7 +3,8 @@
 
 mod manifest;
 mod read;
-mod sightings;
+pub(crate) mod rows;
+pub(crate) mod sightings;
 mod write;
 
 use std::path::Path;
@@ -16,8 +17,8 @@ use crate::open::entries;
 pub use manifest::FORMAT_VERSION;
 pub(crate) use manifest::load_toml;
 pub use read::read_folder;
-pub(crate) use write::write_whole;
 pub use write::{Overwrite, write_folder};
+pub(crate) use write::{duration_s, write_whole};
 
 /// The map.
 const LANDMARKS: &str = "landmarks.csv";
@@ -28,29 +29,30 @@ const WALLS: &str = "walls.csv";
 const WALL_COLUMNS: [&str; 4] = ["x0", "y0", "x1", "y1"];
 
 /// What the nominal simulation believes.
-const NOMINAL: &str = "nominal.toml";
+pub(crate) const NOMINAL: &str = "nominal.toml";
 
 /// A channel of a robot: its file without the ending, and the columns that it must have.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Channel {
-    name: &'static str,
-    columns: &'static [&'static str],
+pub(crate) struct Channel {
+    pub(crate) name: &'static str,
+    pub(crate) columns: &'static [&'static str],
 }
 
-const COMMAND: Channel = Channel { name: "command", columns: &["t", "v_cmd", "w_cmd"] };
-const WHEELS: Channel =
+pub(crate) const COMMAND: Channel = Channel { name: "command", columns: &["t", "v_cmd", "w_cmd"] };
+pub(crate) const WHEELS: Channel =
     Channel { name: "wheel_odometry", columns: &["t", "left_angle_rad", "right_angle_rad"] };
-const VELOCITY: Channel = Channel { name: "velocity", columns: &["t", "v", "w"] };
-const INCREMENT: Channel = Channel { name: "increment", columns: &["t", "dx", "dy", "dyaw"] };
-const GYRO: Channel = Channel { name: "gyro", columns: &["t", "yaw_rate"] };
-const GPS: Channel = Channel { name: "gps", columns: &["t", "x", "y"] };
-const HEADING: Channel = Channel { name: "heading", columns: &["t", "heading"] };
-const RELATIVE: Channel = Channel { name: "relative", columns: &["t", "target_kind", "target_id"] };
-const STEER: Channel = Channel { name: "steer", columns: &["t", "steer_rad"] };
-const SCAN: Channel = Channel { name: "scan", columns: &["t", "bearing", "range"] };
-const TRUTH: Channel = Channel { name: "truth", columns: &["t", "x", "y", "heading"] };
+pub(crate) const VELOCITY: Channel = Channel { name: "velocity", columns: &["t", "v", "w"] };
+pub(crate) const INCREMENT: Channel = Channel { name: "increment", columns: &["t", "dx", "dy", "dyaw"] };
+pub(crate) const GYRO: Channel = Channel { name: "gyro", columns: &["t", "yaw_rate"] };
+pub(crate) const GPS: Channel = Channel { name: "gps", columns: &["t", "x", "y"] };
+pub(crate) const HEADING: Channel = Channel { name: "heading", columns: &["t", "heading"] };
+pub(crate) const RELATIVE: Channel =
+    Channel { name: "relative", columns: &["t", "target_kind", "target_id"] };
+pub(crate) const STEER: Channel = Channel { name: "steer", columns: &["t", "steer_rad"] };
+pub(crate) const SCAN: Channel = Channel { name: "scan", columns: &["t", "bearing", "range"] };
+pub(crate) const TRUTH: Channel = Channel { name: "truth", columns: &["t", "x", "y", "heading"] };
 
-const CHANNELS: [Channel; 11] =
+pub(crate) const CHANNELS: [Channel; 11] =
     [COMMAND, WHEELS, VELOCITY, INCREMENT, GYRO, GPS, HEADING, RELATIVE, STEER, SCAN, TRUTH];
 /// A robot has odometry of one kind.
 const ODOMETRY: [Channel; 3] = [WHEELS, VELOCITY, INCREMENT];

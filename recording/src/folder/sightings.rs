@@ -10,7 +10,7 @@ use pleiad_estimation::{LandmarkId, Pose2, RobotId};
 use crate::table::{Row, Table};
 
 /// Columns after the required ones, in the order of the file.
-pub(super) const OPTIONAL: [&str; 6] = ["relative_kind", "range", "bearing", "x", "y", "yaw"];
+pub(crate) const OPTIONAL: [&str; 6] = ["relative_kind", "range", "bearing", "x", "y", "yaw"];
 
 const TARGET_KIND: usize = 1;
 const TARGET_ID: usize = 2;
@@ -23,7 +23,7 @@ const YAW: usize = 8;
 
 /// What a sighting measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     RangeBearing,
     Range,
     Bearing,
@@ -35,7 +35,7 @@ impl Kind {
     const ALL: [Self; 5] = [Self::RangeBearing, Self::Range, Self::Bearing, Self::Position, Self::Pose];
 
     /// The kind of a measurement.
-    pub(super) fn of(relative: &Relative) -> Self {
+    pub(crate) fn of(relative: &Relative) -> Self {
         match relative {
             Relative::RangeBearing { .. } => Self::RangeBearing,
             Relative::Range { .. } => Self::Range,
@@ -46,7 +46,7 @@ impl Kind {
     }
 
     /// Its name in the column `relative_kind`.
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::RangeBearing => "range_bearing",
             Self::Range => "range",
@@ -54,6 +54,11 @@ impl Kind {
             Self::Position => "position",
             Self::Pose => "pose",
         }
+    }
+
+    /// The kind called `name`.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
     /// The columns that it fills.
@@ -69,7 +74,7 @@ impl Kind {
 }
 
 /// How a file tells the kind of each row.
-pub(super) enum Layout {
+pub(crate) enum Layout {
     /// All rows are of one kind.
     Uniform(Kind),
     /// Each row names its kind.
@@ -77,7 +82,7 @@ pub(super) enum Layout {
 }
 
 /// The layout that a header asks for, or what was expected of it.
-pub(super) fn layout_of(table: &Table) -> Result<Layout, String> {
+pub(crate) fn layout_of(table: &Table) -> Result<Layout, String> {
     if table.has(RELATIVE_KIND) {
         return Ok(Layout::PerRow);
     }
@@ -91,7 +96,7 @@ pub(super) fn layout_of(table: &Table) -> Result<Layout, String> {
 }
 
 /// Who was seen in a row.
-pub(super) fn target(row: &Row<'_>) -> Result<Target, String> {
+pub(crate) fn target(row: &Row<'_>) -> Result<Target, String> {
     match row.text(TARGET_KIND) {
         "robot" => Ok(Target::Robot(RobotId(row.identifier(TARGET_ID, Some('r'))?))),
         "landmark" => Ok(Target::Landmark(LandmarkId(row.identifier(TARGET_ID, Some('L'))?))),
@@ -100,7 +105,7 @@ pub(super) fn target(row: &Row<'_>) -> Result<Target, String> {
 }
 
 /// Where it was seen.
-pub(super) fn relative(row: &Row<'_>, layout: &Layout) -> Result<Relative, String> {
+pub(crate) fn relative(row: &Row<'_>, layout: &Layout) -> Result<Relative, String> {
     let kind = match layout {
         Layout::Uniform(kind) => *kind,
         Layout::PerRow => {
@@ -127,7 +132,7 @@ pub(super) fn relative(row: &Row<'_>, layout: &Layout) -> Result<Relative, Strin
 }
 
 /// The numbers of a measurement by optional column, `range` first; `None` where its kind has none.
-pub(super) fn cells(relative: &Relative) -> [Option<f64>; 5] {
+pub(crate) fn cells(relative: &Relative) -> [Option<f64>; 5] {
     match *relative {
         Relative::RangeBearing { range_m, bearing_rad } => {
             [Some(range_m), Some(bearing_rad), None, None, None]

@@ -4,20 +4,20 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
-use pleiad_estimation::sample::{Reading, Sample, Target};
-use pleiad_estimation::{LandmarkId, Timestamp};
+use pleiad_estimation::LandmarkId;
+use pleiad_estimation::sample::{Sample, Target};
 
 use super::manifest::{self, Manifest};
+use super::rows::{self, Rows};
 use super::{
-    CHANNELS, COMMAND, Channel, GPS, GYRO, HEADING, INCREMENT, LANDMARK_COLUMNS, LANDMARKS, NOMINAL,
-    RELATIVE, SCAN, STEER, TRUTH, VELOCITY, WALL_COLUMNS, WALLS, WHEELS, robot_folder, robots_of, sightings,
+    CHANNELS, Channel, LANDMARK_COLUMNS, LANDMARKS, NOMINAL, RELATIVE, WALL_COLUMNS, WALLS, robot_folder,
+    robots_of, sightings,
 };
 use crate::error::RecordingError;
 use crate::nominal::{COMMENT, nominal_text};
-use crate::number::{push_number, push_time, time_text};
+use crate::number::{push_number, push_time};
 use crate::open::forms_of;
 use crate::report::Form;
-use crate::tidy::Stamped;
 use crate::types::{Recording, RobotRecording};
 
 /// What to do with a recording that is already there.
@@ -148,7 +148,7 @@ fn render(recording: &Recording) -> Result<Vec<(String, String)>, String> {
 }
 
 /// From the first odometry of any robot to the last.
-fn duration_s(recording: &Recording) -> f64 {
+pub(crate) fn duration_s(recording: &Recording) -> f64 {
     let stamps = || recording.robots.values().flat_map(|robot| &robot.odometry).map(|sample| sample.time);
     match (stamps().min(), stamps().max()) {
         (Some(first), Some(last)) => last.seconds_since(first),
@@ -160,78 +160,28 @@ type Rendered = (Channel, String, usize);
 
 /// The texts of the channels that have rows.
 fn render_robot(robot: &RobotRecording) -> Result<Vec<Rendered>, String> {
-    let mut rendered = vec![
-        table(COMMAND, &robot.commands, |command| Some(vec![command.forward_m_s, command.yaw_rate_rad_s]))?,
-        odometry(&robot.odometry)?,
-        table(GYRO, &robot.gyro, |sample| match sample.reading {
-            Reading::Gyro { yaw_rate_rad_s } => Some(vec![yaw_rate_rad_s]),
-            _ => None,
-        })?,
-        table(GPS, &robot.gps, |sample| match sample.reading {
-            Reading::Gps { x_m, y_m } => Some(vec![x_m, y_m]),
-            _ => None,
-        })?,
-        table(HEADING, &robot.heading, |sample| match sample.reading {
-            Reading::Heading { heading_rad } => Some(vec![heading_rad]),
-            _ => None,
-        })?,
-        relative(&robot.sightings)?,
-        table(STEER, &robot.steer, |steer| Some(vec![steer.angle_rad]))?,
-        table(SCAN, &robot.scans, |beam| Some(vec![beam.bearing_rad, beam.range_m]))?,
-        table(TRUTH, &robot.truth, |truth| {
-            Some(vec![truth.pose.x_m(), truth.pose.y_m(), truth.pose.yaw_rad()])
-        })?,
-    ];
+    let mut rendered = rows::channels(robot)?.iter().map(table).collect::<Result<Vec<_>, _>>()?;
+    rendered.push(relative(&robot.sightings)?);
     rendered.retain(|(_, _, rows)| *rows > 0);
     Ok(rendered)
 }
 
-fn odometry(samples: &[Sample]) -> Result<Rendered, String> {
-    match samples.first().map(|sample| sample.reading) {
-        None => Err("odometry: none, and a recording without it cannot be read back".to_owned()),
-        Some(Reading::Velocity { .. }) => table(VELOCITY, samples, |sample| match sample.reading {
-            Reading::Velocity { forward_m_s, yaw_rate_rad_s } => Some(vec![forward_m_s, yaw_rate_rad_s]),
-            _ => None,
-        }),
-        Some(Reading::Increment(_)) => table(INCREMENT, samples, |sample| match sample.reading {
-            Reading::Increment(pose) => Some(vec![pose.x_m(), pose.y_m(), pose.yaw_rad()]),
-            _ => None,
-        }),
-        Some(_) => table(WHEELS, samples, |sample| match sample.reading {
-            Reading::Wheels { left_rad, right_rad } => Some(vec![left_rad, right_rad]),
-            _ => None,
-        }),
-    }
-}
-
-/// Renders a channel whose rows are a stamp and numbers; `None` means a reading of another channel.
-fn table<T: Stamped>(
-    channel: Channel,
-    rows: &[T],
-    numbers: impl Fn(&T) -> Option<Vec<f64>>,
-) -> Result<Rendered, String> {
-    check_order(channel, rows)?;
-    let mut text = channel.columns.join(",") + "\n";
-    for row in rows {
-        let numbers = numbers(row).ok_or_else(|| foreign(channel, row.time()))?;
-        push_time(&mut text, row.time());
-        for value in numbers {
-            push_cell(&mut text, value).map_err(|what| at(channel, row.time(), &what))?;
+/// Renders a channel whose rows are a stamp and numbers.
+fn table(rows: &Rows<'_>) -> Result<Rendered, String> {
+    let mut text = rows.channel.columns.join(",") + "\n";
+    for (row, time) in rows.times.iter().enumerate() {
+        push_time(&mut text, *time);
+        for value in rows.numbers(row)? {
+            text.push(',');
+            push_number(&mut text, value);
         }
         text.push('\n');
     }
-    Ok((channel, text, rows.len()))
+    Ok((rows.channel, text, rows.times.len()))
 }
 
 fn relative(samples: &[Sample]) -> Result<Rendered, String> {
-    check_order(RELATIVE, samples)?;
-    let mut seen = Vec::with_capacity(samples.len());
-    for sample in samples {
-        let Reading::Sighting { target, relative } = sample.reading else {
-            return Err(foreign(RELATIVE, sample.time));
-        };
-        seen.push((sample.time, target, relative));
-    }
+    let seen = rows::sightings(samples)?;
     let first = seen.first().map(|(_, _, relative)| sightings::Kind::of(relative));
     let uniform = seen.iter().all(|(_, _, relative)| Some(sightings::Kind::of(relative)) == first);
     // A uniform file has just the columns of its kind; a mixed one has all, with empty cells.
@@ -266,28 +216,15 @@ fn relative(samples: &[Sample]) -> Result<Rendered, String> {
         let cells = sightings::cells(relative);
         for &column in &columns {
             match cells[column] {
-                Some(value) => push_cell(&mut text, value).map_err(|what| at(RELATIVE, *time, &what))?,
+                Some(value) => {
+                    push_cell(&mut text, value).map_err(|what| rows::at(RELATIVE, *time, &what))?
+                }
                 None => text.push(','),
             }
         }
         text.push('\n');
     }
     Ok((RELATIVE, text, samples.len()))
-}
-
-fn check_order<T: Stamped>(channel: Channel, rows: &[T]) -> Result<(), String> {
-    match rows.windows(2).find(|pair| pair[1].time() < pair[0].time()) {
-        Some(pair) => Err(at(channel, pair[1].time(), "stamped before the row in front of it")),
-        None => Ok(()),
-    }
-}
-
-fn foreign(channel: Channel, time: Timestamp) -> String {
-    at(channel, time, "a reading of another channel")
-}
-
-fn at(channel: Channel, time: Timestamp, what: &str) -> String {
-    format!("{} at {} s: {what}", channel.name, time_text(time))
 }
 
 /// Appends the name of a landmark as the map has it: `L07`.

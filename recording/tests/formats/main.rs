@@ -2,7 +2,9 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "helpers of tests fail by panicking")]
 
+mod bag;
 mod common;
 mod folder;
+mod mcap;
 mod mrclam;
 mod round_trip;

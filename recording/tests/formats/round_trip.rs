@@ -102,7 +102,7 @@ fn robot() -> impl Strategy<Value = RobotRecording> {
     )
 }
 
-fn recording() -> impl Strategy<Value = Recording> {
+pub fn recording() -> impl Strategy<Value = Recording> {
     let landmarks = btree_map(any::<u32>().prop_map(LandmarkId), [number(), number()], 0..5);
     let robots = btree_map((0..9_u32).prop_map(RobotId), robot(), 1..4);
     let walls = proptest::collection::vec([number(), number(), number(), number()], 0..4);
@@ -158,7 +158,7 @@ fn an_interrupted_write_is_refused_when_read() {
     assert!(error.to_string().contains("recording.toml lists robot 2"), "{error}");
 }
 
-fn small() -> Recording {
+pub fn small() -> Recording {
     let reading = Reading::Velocity { forward_m_s: 0.1, yaw_rate_rad_s: 0.2 };
     let robot = RobotRecording {
         odometry: vec![Sample { time: Timestamp(1_248_444_175_103_000_001), reading }],
