@@ -50,11 +50,11 @@ pub fn open_mapped(
         return refused("there is no such folder or file");
     }
     if mapping.is_some() {
-        return bag::open(path, mapping, options);
+        return bag::open(path, mapping, *options);
     }
     if !path.is_dir() {
         return match path.extension().and_then(|ending| ending.to_str()) {
-            Some("mcap" | "csv") => bag::open(path, None, options),
+            Some("mcap" | "csv") => bag::open(path, None, *options),
             _ => refused("it is a file, and neither .mcap nor .csv"),
         };
     }
@@ -62,7 +62,7 @@ pub fn open_mapped(
     match forms_of(path)?.as_slice() {
         [Form::Folder] => folder::read_folder(path, options).map(whole),
         [Form::Mrclam] => mrclam::read_mrclam(path, options).map(whole),
-        [] if bag::is_mapped(path)? => bag::open(path, None, options),
+        [] if bag::is_mapped(path)? => bag::open(path, None, *options),
         [] => refused("it holds no robot"),
         _ => refused("it holds files of both forms, and which is meant is not told by guessing"),
     }

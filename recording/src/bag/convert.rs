@@ -212,7 +212,7 @@ pub(super) fn outcome(
     part: &Part,
     plane: &mut Option<(TangentPlane, Origin)>,
 ) -> Result<Outcome, Refusal> {
-    let missing = || (topic.topic.clone(), format!("what channel {} is made of", topic.channel.name));
+    let missing = || (topic.name.clone(), format!("what channel {} is made of", topic.channel.name));
     let pose = || planar(part.pose.as_ref().ok_or_else(missing)?, topic.max_tilt_rad);
     Ok(match topic.channel.name {
         "velocity" | "command" => {

@@ -1,6 +1,6 @@
 //! `mapping.toml`: which topic or file is which channel of which robot.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use pleiad_estimation::sample::Target;
@@ -154,7 +154,8 @@ pub(super) struct Conversion {
 pub(super) struct Topic {
     /// Its table, for messages.
     pub(super) place: String,
-    pub(super) topic: String,
+    /// Its name in the bag.
+    pub(super) name: String,
     pub(super) robot: RobotId,
     pub(super) channel: Channel,
     pub(super) time: Option<TimeSource>,
@@ -208,9 +209,9 @@ impl Mapping {
                 "expected a latitude from -90 to 90 and a longitude in degrees".to_owned(),
             ));
         }
-        let mut seen = BTreeMap::new();
+        let mut seen = BTreeSet::new();
         for Landmark { id, x_m, y_m } in &told.landmark {
-            if !(x_m.is_finite() && y_m.is_finite()) || seen.insert(*id, ()).is_some() {
+            if !(x_m.is_finite() && y_m.is_finite() && seen.insert(*id)) {
                 let problem = format!("landmark {id}: expected finite numbers, and every landmark once");
                 return Err(refused("landmark", problem));
             }
@@ -310,7 +311,7 @@ fn checked_topic(told: &ToldTopic, place: &str) -> Result<Topic, String> {
     let scale = if channel == RELATIVE { None } else { told.scale.as_deref() };
     Ok(Topic {
         place: place.to_owned(),
-        topic: told.topic.clone(),
+        name: told.topic.clone(),
         robot: RobotId(told.robot),
         channel,
         time: told.time,

@@ -41,7 +41,7 @@ fn is_bag(name: &str) -> bool {
 pub(crate) fn open(
     path: &Path,
     mapping: Option<&Path>,
-    options: &ReadOptions,
+    options: ReadOptions,
 ) -> Result<Opened, RecordingError> {
     let (folder, bags) = if path.is_dir() {
         let names = entries(path)?.into_iter().filter(|(name, is_folder)| !is_folder && is_bag(name));
@@ -68,7 +68,7 @@ pub(crate) fn open(
             return Err(RecordingError::NoMapping { file: path.to_path_buf(), beside, holds });
         }
     };
-    let mut gathered = Gathered::new(path, &told, *options);
+    let mut gathered = Gathered::new(path, &told, options);
     if !told.topics().is_empty() {
         if bags.is_empty() {
             return Err(no_bag(path, &folder)?);

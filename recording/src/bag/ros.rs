@@ -113,7 +113,7 @@ impl Reader<'_, '_> {
     /// Whether a channel is what the mapping takes it for.
     fn channel(&mut self, channel: &Channel) -> Result<(), RecordingError> {
         self.seen.insert((channel.topic.clone(), channel.schema.clone()));
-        for topic in self.mapping.topics().iter().filter(|topic| topic.topic == channel.topic) {
+        for topic in self.mapping.topics().iter().filter(|topic| topic.name == channel.topic) {
             suits(topic, channel).map_err(|problem| self.mapping.refused(&topic.place, problem))?;
         }
         Ok(())
@@ -129,7 +129,7 @@ impl Reader<'_, '_> {
     ) -> Result<(), RecordingError> {
         let Some(kind) = kind_of(&channel.schema) else { return Ok(()) };
         let mapping = self.mapping;
-        let mapped = mapping.topics().iter().enumerate().filter(|(_, topic)| topic.topic == channel.topic);
+        let mapped = mapping.topics().iter().enumerate().filter(|(_, topic)| topic.name == channel.topic);
         for (place, topic) in mapped {
             let parts = (kind.decode)(data)
                 .map_err(|error| (error.to_string(), format!("a message of {}", kind.name)));
@@ -138,14 +138,14 @@ impl Reader<'_, '_> {
             });
             let Err((found, expected)) = result else { continue };
             if self.gathered.options.skip_bad_rows {
-                let file = self.gathered.file(topic.robot, topic.channel, &topic.topic);
+                let file = self.gathered.file(topic.robot, topic.channel, &topic.name);
                 file.rows += 1;
                 file.skip(SkippedRow { line: number, found, expected });
                 continue;
             }
             return Err(RecordingError::BadMessage {
                 file: bag.to_path_buf(),
-                topic: topic.topic.clone(),
+                topic: topic.name.clone(),
                 number,
                 found,
                 expected,
@@ -193,7 +193,7 @@ impl Reader<'_, '_> {
                 }
                 robot.push(Sample { time, reading });
                 waiting.taken += 1;
-                self.gathered.file(topic.robot, topic.channel, &topic.topic).rows += 1;
+                self.gathered.file(topic.robot, topic.channel, &topic.name).rows += 1;
                 return Ok(());
             }
             Outcome::NoFix => {
@@ -205,21 +205,21 @@ impl Reader<'_, '_> {
         rows::insert(robot, topic.channel, time, &scaled)
             .map_err(|expected| (format!("{row:?}"), expected))?;
         waiting.taken += 1;
-        self.gathered.file(topic.robot, topic.channel, &topic.topic).rows += 1;
+        self.gathered.file(topic.robot, topic.channel, &topic.name).rows += 1;
         Ok(())
     }
 
     fn finish(mut self) -> Result<(), RecordingError> {
         let known = |topic: &str| self.seen.iter().any(|(name, _)| name == topic);
-        if let Some(topic) = self.mapping.topics().iter().find(|topic| !known(&topic.topic)) {
+        if let Some(topic) = self.mapping.topics().iter().find(|topic| !known(&topic.name)) {
             let problem = format!(
                 "the bag has no topic `{}`; correct the key `topic`; {}",
-                topic.topic,
+                topic.name,
                 list(&self.seen)
             );
             return Err(self.mapping.refused(&topic.place, problem));
         }
-        let mapped = |topic: &str| self.mapping.topics().iter().any(|own| own.topic == topic);
+        let mapped = |topic: &str| self.mapping.topics().iter().any(|own| own.name == topic);
         let left: Vec<&str> =
             self.seen.iter().map(|(topic, _)| topic.as_str()).filter(|topic| !mapped(topic)).collect();
         if !left.is_empty() {
@@ -308,7 +308,7 @@ impl Gathered<'_> {
         let Waiting { poses, speeds, without_fix, other_frames, taken } = waiting;
         let count = poses.len() + speeds.len();
         if without_fix > 0 {
-            let warning = format!("{}: {without_fix} messages without a fix left out", topic.topic);
+            let warning = format!("{}: {without_fix} messages without a fix left out", topic.name);
             self.report.warnings.push(warning);
         }
         if taken == 0 && !other_frames.is_empty() {
@@ -329,10 +329,10 @@ impl Gathered<'_> {
         made.extend(angles(speeds, &topic.conversion.scale));
         let dropped = count - made.len();
         if dropped > 0 {
-            let warning = format!("{}: {dropped} messages with the stamp of another left out", topic.topic);
+            let warning = format!("{}: {dropped} messages with the stamp of another left out", topic.name);
             self.report.warnings.push(warning);
         }
-        self.file(topic.robot, topic.channel, &topic.topic).rows += made.len();
+        self.file(topic.robot, topic.channel, &topic.name).rows += made.len();
         let robot = self.recording.robots.entry(topic.robot).or_default();
         for (time, numbers) in made {
             rows::insert(robot, topic.channel, time, &numbers)

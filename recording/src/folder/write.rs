@@ -217,7 +217,7 @@ fn relative(samples: &[Sample]) -> Result<Rendered, String> {
         for &column in &columns {
             match cells[column] {
                 Some(value) => {
-                    push_cell(&mut text, value).map_err(|what| rows::at(RELATIVE, *time, &what))?
+                    push_cell(&mut text, value).map_err(|what| rows::at(RELATIVE, *time, &what))?;
                 }
                 None => text.push(','),
             }

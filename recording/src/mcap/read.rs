@@ -40,10 +40,10 @@ pub(crate) fn is_own(path: &Path) -> Result<bool, RecordingError> {
 }
 
 /// Reads the recording in `path`.
-pub(crate) fn read_own(path: &Path, options: &ReadOptions) -> Result<Opened, RecordingError> {
+pub(crate) fn read_own(path: &Path, options: ReadOptions) -> Result<Opened, RecordingError> {
     let mut reader = Reader {
         path,
-        options: *options,
+        options,
         recording: Recording::default(),
         files: BTreeMap::new(),
         report: IngestReport::new(Form::Mcap),
@@ -69,9 +69,8 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn take(&mut self, item: Item<'_>) -> Result<(), RecordingError> {
         match item {
-            Item::Channel(_) => Ok(()),
             Item::Metadata { name, values } if name == METADATA => self.metadata(&values),
-            Item::Metadata { .. } => Ok(()),
+            Item::Metadata { .. } | Item::Channel(_) => Ok(()),
             Item::Attachment { name, data } => {
                 let Ok(text) = std::str::from_utf8(data) else {
                     self.report.warnings.push(format!("attachment {name}: not text; not read"));

@@ -135,13 +135,11 @@ impl<'a> Output<'a> {
 
     /// The number of the channel, which several robots may share.
     fn add(&mut self, channel: ChannelSpec) -> usize {
-        match self.channels.iter().position(|known| known.topic == channel.topic) {
-            Some(known) => known,
-            None => {
-                self.channels.push(channel);
-                self.channels.len() - 1
-            }
-        }
+        let known = self.channels.iter().position(|known| known.topic == channel.topic);
+        known.unwrap_or_else(|| {
+            self.channels.push(channel);
+            self.channels.len() - 1
+        })
     }
 
     /// A channel of JSON whose schema is named by its title.
