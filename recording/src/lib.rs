@@ -11,6 +11,7 @@
 mod bag;
 mod effect_spec;
 mod error;
+mod estimates;
 mod folder;
 mod ingest;
 mod mcap;
@@ -30,6 +31,7 @@ mod view;
 
 pub use effect_spec::{DeclaredEffect, EffectSpec, ScopeSpec, SpecError};
 pub use error::RecordingError;
+pub use estimates::{read_estimates, write_estimates};
 pub use folder::{FORMAT_VERSION, Overwrite, read_folder, write_folder};
 pub use ingest::ReadOptions;
 pub use mcap::{Estimate, LogLevel, LogLine, McapContents, write_mcap};

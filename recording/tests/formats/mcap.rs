@@ -11,7 +11,7 @@ use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{LandmarkId, Pose2, RobotId, Timestamp};
 use pleiad_recording::{
     Estimate, Form, LogLevel, LogLine, McapContents, Nominal, ReadOptions, Recording, TruthSample, open,
-    open_mapped, write_mcap,
+    open_mapped, read_estimates, write_estimates, write_mcap,
 };
 use pleiad_ros::from_cdr;
 use pleiad_ros::messages::nav_msgs::Odometry;
@@ -220,6 +220,26 @@ fn an_estimate_is_the_same_pose_in_every_view() {
     assert_eq!(moved["rotation"], pose["pose"]["orientation"]);
     let log: Value = serde_json::from_slice(of("/log").next().unwrap()).unwrap();
     assert_eq!((log["level"].as_u64(), log["name"].as_str()), (Some(3), Some("replay")));
+}
+
+#[test]
+fn estimates_are_read_back_and_written_as_csv() {
+    let (folder, path) = run();
+    let read = read_estimates(&path).unwrap();
+    assert_eq!(read.keys().collect::<Vec<_>>(), [&RobotId(1)]);
+    assert_eq!(read[&RobotId(1)].len(), 3);
+    for (read, written) in read[&RobotId(1)].iter().zip(estimates()) {
+        assert_eq!((read.time, read.covariance), (written.time, written.covariance));
+        assert_eq!(read.pose.position(), written.pose.position());
+        assert!((read.pose.yaw_rad() - written.pose.yaw_rad()).abs() < 1e-15);
+    }
+    let csv = folder.path().join("settled/robot-1.csv");
+    write_estimates(&csv, &estimates()[..1]).unwrap();
+    assert_eq!(
+        fs::read_to_string(&csv).unwrap(),
+        "t,x,y,heading,cov_xx,cov_xy,cov_yy,cov_x_heading,cov_y_heading,cov_heading_heading\n\
+         1248444176.000000000,0.0,2.0,0.5,0.04,0.01,0.09,0.001,0.002,0.0025\n"
+    );
 }
 
 #[test]
