@@ -31,6 +31,11 @@ recordings:
     cargo test -p pleiad-mismatch --features recordings --test recordings
     cargo test -p pleiad-tests --features recordings --test recordings --test recordings_diagnosis --test recordings_mrclam_diagnosis --test recordings_faults --test recordings_slam
 
+# What rosbags, mcap, pymap3d and evo say of our files; installs them into target/python.
+witnesses:
+    .ci/python-venv
+    cargo test -p pleiad-ros -p pleiad-recording --features pleiad-ros/python,pleiad-recording/python --test rosbags --test python
+
 # Consistency over many seeded runs; takes minutes.
 monte-carlo:
     cargo test -p pleiad-tests --features slow --test monte_carlo

@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod evaluate;
+mod export;
 mod filter;
 mod slam;
 mod survey;
@@ -17,6 +18,7 @@ use pleiad_sim_peers::scenario::ManoeuvreKind;
 
 pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
 pub use evaluate::{EvaluateArgs, VariantArg, VariantFilter};
+pub use export::{ExportArgs, ExportForm};
 pub use filter::FilterArgs;
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
@@ -47,6 +49,8 @@ pub enum Command {
     Observability(ObservabilityArgs),
     /// A recording of a scenario; or what the nominal model predicts of one, and what was measured instead.
     Simulate(SimulateArgs),
+    /// A recording, and the estimates in a run, for other tools: csv, TUM, MCAP.
+    Export(ExportArgs),
     /// What physics the nominal model leaves out: where, what, how sure, and the corrected model.
     Diagnose(DiagnoseArgs),
     /// How good the diagnosis is, where the answers are known.
@@ -132,8 +136,8 @@ pub struct RunArgs {
 
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// A recording folder, a run folder, or an MRCLAM folder. The robots of a run start as they were told
-    /// then (priors.toml), others where the ground truth says.
+    /// A recording folder, a run folder, an MRCLAM folder, an .mcap file, or a ROS 2 bag or .csv files with a mapping.
+    /// The robots of a run start as they were told then (priors.toml), others where the ground truth says.
     pub recording: PathBuf,
     #[command(flatten)]
     pub filter: FilterArgs,
@@ -163,6 +167,9 @@ pub struct ReplayArgs {
     /// Default: model.toml in the recording, if it is there.
     #[arg(long)]
     pub model: Option<PathBuf>,
+    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
+    #[arg(long, value_name = "FILE")]
+    pub mapping: Option<PathBuf>,
     /// Leave out rows that cannot be read; they are counted and reported.
     #[arg(long)]
     pub skip_bad_rows: bool,
@@ -176,7 +183,7 @@ pub struct ReplayArgs {
 
 #[derive(Debug, Args)]
 pub struct ObservabilityArgs {
-    /// A scenario (a TOML file) or a recording (a folder).
+    /// A scenario (a TOML file) or a recording (a folder or an .mcap file).
     pub input: PathBuf,
     /// Seed of a scenario; its own if absent.
     #[arg(long)]
@@ -223,7 +230,7 @@ pub struct SimulateArgs {
 
 #[derive(Debug, Args)]
 pub struct DiagnoseArgs {
-    /// Recording folders, run folders or MRCLAM folders; several are diagnosed together.
+    /// Recording folders, run folders, MRCLAM folders, .mcap files, or bags with mappings; several are diagnosed together.
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
     /// What the nominal simulation believes, instead of the recordings' own nominal.toml.
@@ -246,6 +253,9 @@ pub struct DiagnoseArgs {
     /// Effects of the catalogue that are not tried, as in lateral_skid,crab: what is said of them without a name.
     #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
     pub without: Vec<String>,
+    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
+    #[arg(long, value_name = "FILE")]
+    pub mapping: Option<PathBuf>,
     /// Leave out rows that cannot be read; they are counted and reported.
     #[arg(long)]
     pub skip_bad_rows: bool,

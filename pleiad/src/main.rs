@@ -7,6 +7,7 @@ mod folder;
 mod levels;
 mod output;
 mod payload;
+mod run_file;
 mod setup;
 
 use std::io::IsTerminal;

@@ -1,6 +1,7 @@
 //! From a scenario or a recording to the configurations of a team's agents and the samples they get.
 
 mod beside;
+mod input;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -23,8 +24,9 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-pub use beside::{MODEL, copy_model, write_beside};
+pub use beside::{MODEL, beside_texts, copy_model, texts_beside, write_beside};
 use beside::{model_for, priors_beside};
+pub use input::{Input, is_recording, open};
 
 use crate::cli::{AbsoluteArg, FilterArgs, LandmarksArg};
 

@@ -32,6 +32,9 @@ pub struct UmbmarkArgs {
     /// The robot that is calibrated, where recordings hold several.
     #[arg(long, conflicts_with = "simulate")]
     pub robot: Option<u32>,
+    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
+    #[arg(long, value_name = "FILE")]
+    pub mapping: Option<PathBuf>,
     /// Leave out rows that cannot be read.
     #[arg(long, conflicts_with = "simulate")]
     pub skip_bad_rows: bool,
@@ -75,6 +78,9 @@ pub struct MapArgs {
     /// Believed at first: a_rot, rad/m.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, requires = "recording")]
     pub a_rot: f64,
+    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
+    #[arg(long, value_name = "FILE")]
+    pub mapping: Option<PathBuf>,
     /// Leave out rows that cannot be read.
     #[arg(long, requires = "recording")]
     pub skip_bad_rows: bool,

@@ -8,7 +8,7 @@ use super::ErrorArg;
 
 #[derive(Debug, Args)]
 pub struct SlamArgs {
-    /// A scenario (a TOML file), a recording folder, a run folder, or an MRCLAM folder.
+    /// A scenario (a TOML file), a recording folder, a run folder, an MRCLAM folder, an .mcap file, or a bag.
     pub input: PathBuf,
     /// How sightings find their landmarks.
     #[arg(long, value_enum, default_value_t = AssociationArg::Identity)]
@@ -37,6 +37,9 @@ pub struct SlamArgs {
     /// Noise and geometry of the robots of a recording, as for `pleiad replay`.
     #[arg(long)]
     pub noise: Option<PathBuf>,
+    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
+    #[arg(long, value_name = "FILE")]
+    pub mapping: Option<PathBuf>,
     /// Leave out rows of a recording that cannot be read; they are counted and reported.
     #[arg(long)]
     pub skip_bad_rows: bool,

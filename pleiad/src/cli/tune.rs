@@ -11,7 +11,7 @@ use crate::levels;
 
 #[derive(Debug, Args)]
 pub struct TuneArgs {
-    /// A recording folder, a run folder, or an MRCLAM folder. The robots of a run start as they were told
+    /// A recording folder, a run folder, an MRCLAM folder, an .mcap file, or a bag with a mapping. The robots of a run start as they were told
     /// then (priors.toml), others where the ground truth says; nothing else of the ground truth is used.
     pub recording: PathBuf,
     /// Which landmarks the robots know: known, none, numbers as in 6,7, or team: none, and the team maps them.
@@ -35,6 +35,9 @@ pub struct TuneArgs {
     /// keys as in motion.yaw_rad_per_sqrt_rad,sensors.range_bearing.sigma_range_per_m.
     #[arg(long, default_value = "auto")]
     pub also: AlsoArg,
+    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
+    #[arg(long, value_name = "FILE")]
+    pub mapping: Option<PathBuf>,
     /// Leave out rows that cannot be read; they are counted and reported.
     #[arg(long)]
     pub skip_bad_rows: bool,

@@ -9,6 +9,7 @@ mod diagnose;
 mod effects;
 mod evaluate;
 mod evict;
+mod export;
 mod faults;
 mod observability;
 mod replay;
@@ -23,7 +24,7 @@ mod survey;
 mod tune;
 mod worlds;
 
-pub use runner::Survived;
+pub use runner::{Survived, with_samples};
 
 use crate::cli::{Benchmark, Command};
 
@@ -36,6 +37,7 @@ pub fn run(command: Command) -> anyhow::Result<()> {
         Command::Tune(args) => tune::run(&args),
         Command::Observability(args) => observability::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Benchmark(Benchmark::Concealed(args)) => concealed::run(&args),
         Command::Faults(args) => faults::run(&args),

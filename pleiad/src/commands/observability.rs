@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use anyhow::{Context, bail};
 use pleiad_estimation::RobotId;
 use pleiad_estimation::observability::{Observability, of_entries};
-use pleiad_recording::ReadOptions;
 use pleiad_sim_peers::{Scenario, connectivity, simulate};
 use serde::Serialize;
 
@@ -13,7 +12,7 @@ use super::runner;
 use crate::cli::{ErrorArg, FilterArgs, LandmarksArg, ObservabilityArgs};
 use crate::evaluation::RunResult;
 use crate::output;
-use crate::setup::{self, ReplayOptions, Team};
+use crate::setup::{self, Input, ReplayOptions, Team};
 
 /// Window within which a sighting links two robots, seconds.
 const CONNECTIVITY_WINDOW_S: f64 = 10.0;
@@ -49,14 +48,14 @@ pub fn of_run(result: &RunResult) -> anyhow::Result<Observability> {
 
 pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
     let filter = FilterArgs::exact(ErrorArg::Invariant);
-    let team = if args.input.is_dir() {
+    let team = if setup::is_recording(&args.input) {
         if args.seed.is_some() {
             bail!("--seed: a recording has none; it is for scenarios");
         }
-        let folder = setup::recording_folder(&args.input);
-        let (recording, ingest) = pleiad_recording::open(&folder, &ReadOptions::default())?;
+        let input = setup::open(&args.input, None, false)?;
+        let Input { recording, ingest, folder, .. } = &input;
         setup::recorded(
-            &recording,
+            recording,
             &ReplayOptions {
                 filter,
                 landmarks: &args.landmarks,
@@ -66,7 +65,7 @@ pub fn run(args: &ObservabilityArgs) -> anyhow::Result<()> {
                 seed: 1,
                 noise: None,
                 model: None,
-                folder: &folder,
+                folder,
                 mrclam: ingest.form == pleiad_recording::Form::Mrclam,
             },
         )?

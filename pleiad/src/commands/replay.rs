@@ -7,15 +7,15 @@ use anyhow::Context;
 use pleiad_agent::SettledEstimate;
 use pleiad_agent::results::{AgentSummary, Found, FoundLandmark, FoundParameter, FoundRobot};
 use pleiad_estimation::{LandmarkId, Timestamp};
-use pleiad_recording::{IngestReport, ReadOptions, Recording, tum};
+use pleiad_recording::{IngestReport, Recording, tum};
 use pleiad_report::{ReplayReport, RobotScore, replay_report, run_report, write_summary};
 use serde::Serialize;
 
 use super::runner::{self, Feeder, ProcessOptions, Survived};
 use crate::cli::ReplayArgs;
 use crate::evaluation::{self, NisJson, RunResult};
-use crate::setup::{self, ReplayOptions, Team};
-use crate::{output, payload};
+use crate::setup::{self, Input, ReplayOptions, Team};
+use crate::{output, payload, run_file};
 
 /// `replay --json` and `summary.json`.
 #[derive(Debug, Serialize)]
@@ -90,9 +90,8 @@ pub struct SecondsJson {
 }
 
 pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
-    let folder = setup::recording_folder(&args.recording);
-    let (recording, ingest) =
-        pleiad_recording::open(&folder, &ReadOptions { skip_bad_rows: args.skip_bad_rows })?;
+    let input = setup::open(&args.recording, args.mapping.as_deref(), args.skip_bad_rows)?;
+    let Input { recording, ingest, folder, .. } = &input;
     let options = ReplayOptions {
         filter: args.filter.clone(),
         landmarks: &args.landmarks,
@@ -102,10 +101,10 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         seed: args.seed,
         noise: args.noise.as_deref(),
         model: args.model.as_deref(),
-        folder: &folder,
+        folder,
         mrclam: ingest.form == pleiad_recording::Form::Mrclam,
     };
-    let team = setup::recorded(&recording, &options)?;
+    let team = setup::recorded(recording, &options)?;
     let out = crate::folder::create(args.out.as_deref(), &format!("replay-{}", recording.name))?;
     let result = if args.processes {
         let options = ProcessOptions {
@@ -120,7 +119,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         runner::in_process(&team, "replaying")?
     };
     let command = command_line();
-    let json = write_run(&team, &result, &out, &command, Some(ingest))?;
+    let json = write_run(&team, &result, &out, &command, Some(ingest.clone()))?;
     output::print(args.json, &json, &text(&json))
 }
 
@@ -144,6 +143,7 @@ pub fn write_run(
     let (first, last) = team.span().context("there is not a single sample")?;
     let replayed = ingest.is_some();
     write_trajectories(result, out)?;
+    run_file::write(team, result, out, command, first)?;
     let scores: Vec<RobotScore> =
         result.robots.iter().map(|(robot, own)| evaluation::score(*robot, own, &team.recording)).collect();
     let json = summary(&team.recording, result, &scores, (first, last), out, command, ingest);

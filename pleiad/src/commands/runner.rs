@@ -240,7 +240,7 @@ fn feeder_input(team: &Team, out: &Path, feeder: &Feeder) -> anyhow::Result<Vec<
 }
 
 /// The recording with these samples in place of its own; truth, commands and map stay.
-fn with_samples(recording: &Recording, samples: &BTreeMap<RobotId, Vec<Sample>>) -> Recording {
+pub fn with_samples(recording: &Recording, samples: &BTreeMap<RobotId, Vec<Sample>>) -> Recording {
     let mut replaced = recording.clone();
     replaced.robots.retain(|robot, _| samples.get(robot).is_some_and(|samples| !samples.is_empty()));
     for (robot, channels) in &mut replaced.robots {

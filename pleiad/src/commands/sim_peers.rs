@@ -26,7 +26,7 @@ pub fn run(args: &SimPeersArgs) -> anyhow::Result<()> {
     if !(args.patience.is_finite() && args.patience > 0.0) {
         bail!("--patience {}: expected a positive number of seconds", args.patience);
     }
-    let recording = if args.input.is_dir() {
+    let recording = if setup::is_recording(&args.input) {
         pleiad_recording::open(&setup::recording_folder(&args.input), &ReadOptions::default())?.0
     } else {
         let scenario = Scenario::load(&args.input)?;

@@ -9,13 +9,12 @@ use pleiad_estimation::sample::{Reading, Target};
 use pleiad_estimation::slam::Association;
 use pleiad_estimation::strategy::Noises;
 use pleiad_estimation::symmetric::Symmetric3;
-use pleiad_recording::ReadOptions;
 use pleiad_sim_peers::Scenario;
 use pleiad_survey::slam::{Asked, RunOptions, SlamInput, SlamPage, on_recording, on_scenario};
 
 use super::{replay, study};
 use crate::cli::{AssociationArg, ErrorArg, FilterArgs, LandmarksArg, MeasureArg, SlamArgs};
-use crate::setup::{self, ReplayOptions};
+use crate::setup::{self, Input, ReplayOptions};
 use crate::{folder, output};
 
 pub fn run(args: &SlamArgs) -> anyhow::Result<()> {
@@ -60,11 +59,10 @@ fn of_scenario(args: &SlamArgs, options: RunOptions) -> anyhow::Result<SlamPage>
 }
 
 fn of_recording(args: &SlamArgs, options: &RunOptions) -> anyhow::Result<SlamPage> {
-    let folder = setup::recording_folder(&args.input);
-    let (recording, ingest) =
-        pleiad_recording::open(&folder, &ReadOptions { skip_bad_rows: args.skip_bad_rows })?;
+    let input = setup::open(&args.input, args.mapping.as_deref(), args.skip_bad_rows)?;
+    let Input { recording, ingest, folder, .. } = &input;
     let team = setup::recorded(
-        &recording,
+        recording,
         &ReplayOptions {
             filter: FilterArgs::exact(args.error),
             landmarks: &LandmarksArg::Known,
@@ -74,7 +72,7 @@ fn of_recording(args: &SlamArgs, options: &RunOptions) -> anyhow::Result<SlamPag
             seed: 1,
             noise: args.noise.as_deref(),
             model: None,
-            folder: &folder,
+            folder,
             mrclam: ingest.form == pleiad_recording::Form::Mrclam,
         },
     )?;

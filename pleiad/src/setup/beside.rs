@@ -19,10 +19,16 @@ pub const MODEL: &str = "model.toml";
 
 /// Writes beside a recording what a replay has to know of its robots: noise, geometry and start.
 pub fn write_beside(agents: &BTreeMap<RobotId, AgentConfig>, folder: &Path) -> anyhow::Result<()> {
-    let write = |name: &str, text: String| {
+    for (name, text) in beside_texts(agents)? {
         let path = folder.join(name);
-        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
-    };
+        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(())
+}
+
+/// The texts of the files that lie beside a recording, by name.
+pub fn beside_texts(agents: &BTreeMap<RobotId, AgentConfig>) -> anyhow::Result<BTreeMap<String, String>> {
+    let mut texts = BTreeMap::new();
     let mut priors = BTreeMap::new();
     for (robot, agent) in agents {
         let noise = NoiseFile {
@@ -31,15 +37,44 @@ pub fn write_beside(agents: &BTreeMap<RobotId, AgentConfig>, folder: &Path) -> a
             sensors: agent.sensors.clone(),
             calibration: agent.calibration,
         };
-        write(&format!("noise-r{robot}.toml"), toml::to_string(&noise)?)?;
+        texts.insert(format!("noise-r{robot}.toml"), toml::to_string(&noise)?);
         if let Some(prior) = &agent.prior {
             priors.insert(robot.to_string(), prior);
         }
     }
     if let Some(model) = agents.values().find_map(|agent| agent.model.as_ref()) {
-        copy_model(model, &folder.join(MODEL))?;
+        let text = std::fs::read_to_string(model)
+            .with_context(|| format!("cannot read the model {}", model.display()))?;
+        texts.insert(MODEL.to_owned(), text);
     }
-    write(PRIORS, toml::to_string(&priors)?)
+    texts.insert(PRIORS.to_owned(), toml::to_string(&priors)?);
+    Ok(texts)
+}
+
+/// Whether a file of this name lies beside a recording: noise of all robots or of one, starts, a model.
+pub(super) fn is_beside(name: &str) -> bool {
+    let of_robot = |name: &str| {
+        let number = name.strip_prefix("noise-r").and_then(|rest| rest.strip_suffix(".toml"));
+        number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
+    };
+    matches!(name, "noise.toml" | PRIORS | MODEL) || of_robot(name)
+}
+
+/// The texts of such files in `folder`, by name.
+pub fn texts_beside(folder: &Path) -> anyhow::Result<BTreeMap<String, String>> {
+    let mut texts = BTreeMap::new();
+    let listed = std::fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
+    for entry in listed {
+        let entry = entry.with_context(|| format!("cannot list {}", folder.display()))?;
+        let Ok(name) = entry.file_name().into_string() else { continue };
+        if is_beside(&name) {
+            let path = entry.path();
+            let text =
+                std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+            texts.insert(name, text);
+        }
+    }
+    Ok(texts)
 }
 
 /// Copies a model file.

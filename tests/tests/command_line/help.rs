@@ -2,7 +2,7 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 18] = [
     "demo",
     "run",
     "replay",
@@ -18,6 +18,7 @@ const COMMANDS: [&str; 17] = [
     "agent",
     "coordinator",
     "evict",
+    "export",
     "sim-peers",
     "completions",
 ];

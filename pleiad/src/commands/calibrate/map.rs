@@ -3,7 +3,7 @@
 use anyhow::Context;
 use pleiad_mismatch::calibration::map::{Drift, MapCalibration, MapOptions, calibrate};
 use pleiad_mismatch::calibration::umbmark::{WheelErrors, believed, corrected};
-use pleiad_recording::{ReadOptions, write_model};
+use pleiad_recording::write_model;
 use pleiad_survey::{Study, StudyOptions, map};
 use serde_json::{Map, Value, json};
 
@@ -20,8 +20,7 @@ pub fn run(args: &MapArgs) -> anyhow::Result<()> {
         spinner.finish_and_clear();
         return study::show(&outcome, &out, args.json, &command_line());
     };
-    let options = ReadOptions { skip_bad_rows: args.skip_bad_rows };
-    let (recording, _) = pleiad_recording::open(&setup::recording_folder(path), &options)?;
+    let recording = setup::open(path, args.mapping.as_deref(), args.skip_bad_rows)?.recording;
     let robot = super::robot(args.robot, std::slice::from_ref(&recording))?;
     let options = MapOptions {
         start: Drift { trans: args.a_trans, rot_rad_m: args.a_rot },

@@ -7,7 +7,7 @@ use pleiad_estimation::RobotId;
 use pleiad_mismatch::calibration::umbmark::{
     Run, Stage, Umbmark, UmbmarkError, WheelFactors, believed, calibrate, corrected, left_out,
 };
-use pleiad_recording::{Nominal, ReadOptions, Recording, write_folder, write_model};
+use pleiad_recording::{Nominal, Recording, write_folder, write_model};
 use pleiad_sim_peers::Scenario;
 use pleiad_survey::{Claim, Shown, Study, StudyOptions, umbmark};
 use serde_json::{Map, json};
@@ -51,8 +51,7 @@ fn simulated(args: &UmbmarkArgs) -> anyhow::Result<()> {
 fn recorded(args: &UmbmarkArgs) -> anyhow::Result<()> {
     let mut recordings = Vec::new();
     for path in &args.recordings {
-        let options = ReadOptions { skip_bad_rows: args.skip_bad_rows };
-        recordings.push(pleiad_recording::open(&setup::recording_folder(path), &options)?.0);
+        recordings.push(setup::open(path, args.mapping.as_deref(), args.skip_bad_rows)?.recording);
     }
     let robot = super::robot(args.robot, &recordings)?;
     let runs = recordings.iter().map(|recording| Run::of(recording, robot)).collect::<Result<Vec<_>, _>>()?;

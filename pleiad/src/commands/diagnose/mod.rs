@@ -15,11 +15,12 @@ use anyhow::Context;
 use pleiad_benchmark::manoeuvre::{advice, proposals};
 use pleiad_mismatch::{DiagnoseOptions, Findings, TruthUse, diagnose};
 use pleiad_physics::Effect;
-use pleiad_recording::{Nominal, ReadOptions, Recording, read_model};
+use pleiad_recording::{Nominal, Recording, read_model};
 use pleiad_report::{diagnose_report, write_summary};
 
 use crate::cli::{DiagnoseArgs, TruthArg};
-use crate::{folder, output, setup};
+use crate::setup::{self, Input};
+use crate::{folder, output};
 
 pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
     let leave_out = without(&args.without)?;
@@ -29,7 +30,8 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
     let mut recordings = Vec::new();
     for (name, path) in &chosen.recordings {
         spinner.set_message(format!("reading {name}"));
-        recordings.push(read(name, path, args.skip_bad_rows, model.as_ref(), &mut chosen.notes)?);
+        let mapping = args.mapping.as_deref();
+        recordings.push(read(name, path, mapping, args.skip_bad_rows, model.as_ref(), &mut chosen.notes)?);
     }
     // A folder that cannot be written to is told before the work, a new one is made after it.
     let asked = args.out.as_deref().map(|out| folder::create(Some(out), "")).transpose()?;
@@ -96,12 +98,12 @@ fn model(path: &Path) -> anyhow::Result<Nominal> {
 fn read(
     name: &str,
     path: &Path,
+    mapping: Option<&Path>,
     skip_bad_rows: bool,
     model: Option<&Nominal>,
     notes: &mut Vec<String>,
 ) -> anyhow::Result<Recording> {
-    let (mut recording, ingest) =
-        pleiad_recording::open(&setup::recording_folder(path), &ReadOptions { skip_bad_rows })?;
+    let Input { mut recording, ingest, .. } = setup::open(path, mapping, skip_bad_rows)?;
     // That of the folder given, also where the recording lies within it.
     name.clone_into(&mut recording.name);
     if !ingest.is_clean() {

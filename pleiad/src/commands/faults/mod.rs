@@ -11,7 +11,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::{Context, bail};
 use pleiad_bus::FaultPlan;
 use pleiad_estimation::strategy::StrategyKind;
-use pleiad_recording::ReadOptions;
 use pleiad_report::write_summary;
 use pleiad_sim_peers::{Scenario, simulate};
 use serde::Serialize;
@@ -20,7 +19,7 @@ use crate::cli::{ErrorArg, FaultsArgs, FilterArgs, LandmarksArg};
 use crate::commands::replay::command_line;
 use crate::commands::worlds::{Truth, World};
 use crate::output;
-use crate::setup::{self, ReplayOptions};
+use crate::setup::{self, Input, ReplayOptions};
 use levels::Level;
 use rows::Row;
 use run::{RunScore, Window};
@@ -60,7 +59,7 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
         seconds,
         fault_start_s: window.start_s,
         fault_end_s: window.end_s,
-        independent_worlds: !args.input.is_dir(),
+        independent_worlds: !setup::is_recording(&args.input),
         rows,
         notes,
     };
@@ -73,9 +72,9 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
 fn worlds(args: &FaultsArgs) -> anyhow::Result<(FaultPlan, Vec<World>, Vec<String>)> {
     let filter = FilterArgs::exact(ErrorArg::Invariant);
     let own = args.faults.as_deref().map(FaultPlan::load).transpose()?;
-    if args.input.is_dir() {
-        let folder = setup::recording_folder(&args.input);
-        let (recording, ingest) = pleiad_recording::open(&folder, &ReadOptions::default())?;
+    if setup::is_recording(&args.input) {
+        let input = setup::open(&args.input, None, false)?;
+        let Input { recording, ingest, folder, .. } = &input;
         let options = ReplayOptions {
             filter,
             landmarks: &args.landmarks,
@@ -85,13 +84,13 @@ fn worlds(args: &FaultsArgs) -> anyhow::Result<(FaultPlan, Vec<World>, Vec<Strin
             seed: 1,
             noise: None,
             model: None,
-            folder: &folder,
+            folder,
             mrclam: ingest.form == pleiad_recording::Form::Mrclam,
         };
         let mut notes = Vec::new();
         let first = args.seed.unwrap_or(1);
         let worlds = (first..first.saturating_add(args.seeds)).map(|seed| {
-            let team = setup::recorded(&recording, &options)?;
+            let team = setup::recorded(recording, &options)?;
             notes.clone_from(&team.notes);
             let truth = Truth::Recorded(Box::new(team.recording.clone()));
             World::new(team, truth, seed)
@@ -174,7 +173,7 @@ fn table(args: &FaultsArgs, worlds: &[World], levels: &[Level], window: Window) 
                 &runs,
                 &lossless,
                 &exact,
-                !args.input.is_dir(),
+                !setup::is_recording(&args.input),
             ));
         }
     }

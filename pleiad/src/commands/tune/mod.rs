@@ -9,10 +9,9 @@ use std::time::Instant;
 
 use anyhow::bail;
 use pleiad_estimation::likelihood::{Level, largest_reading_m};
-use pleiad_recording::ReadOptions;
 
 use crate::cli::{AlsoArg, ErrorArg, FilterArgs, TuneArgs};
-use crate::setup::{self, ReplayOptions};
+use crate::setup::{self, Input, ReplayOptions};
 use crate::{levels, output};
 
 /// What a level begins with that is asked for and zero.
@@ -20,9 +19,8 @@ const BEGINNING: f64 = 0.03;
 
 pub fn run(args: &TuneArgs) -> anyhow::Result<()> {
     let began = Instant::now();
-    let folder = setup::recording_folder(&args.recording);
-    let (recording, ingest) =
-        pleiad_recording::open(&folder, &ReadOptions { skip_bad_rows: args.skip_bad_rows })?;
+    let input = setup::open(&args.recording, args.mapping.as_deref(), args.skip_bad_rows)?;
+    let Input { recording, ingest, folder, .. } = &input;
     let options = ReplayOptions {
         filter: FilterArgs::exact(ErrorArg::Invariant),
         landmarks: &args.landmarks,
@@ -32,10 +30,10 @@ pub fn run(args: &TuneArgs) -> anyhow::Result<()> {
         seed: 0,
         noise: args.noise.as_deref(),
         model: args.model.as_deref(),
-        folder: &folder,
+        folder,
         mrclam: ingest.form == pleiad_recording::Form::Mrclam,
     };
-    let team = setup::recorded(&recording, &options)?;
+    let team = setup::recorded(recording, &options)?;
     let spinner = output::spinner(&format!("{}: facts", recording.name));
     let gathered = gather::gather(&team)?;
     let there = search::in_facts(&gathered.facts);
