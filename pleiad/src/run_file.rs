@@ -36,9 +36,8 @@ pub fn write(
         }
         fed
     };
-    let settled = result.robots.iter().map(|(robot, own)| {
-        (*robot, own.settled.iter().map(estimate).collect())
-    });
+    let settled =
+        result.robots.iter().map(|(robot, own)| (*robot, own.settled.iter().map(estimate).collect()));
     let log = |level, message: &str| LogLine {
         time: start,
         level,

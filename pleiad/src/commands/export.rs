@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_recording::{
-    Estimate, Form, IngestReport, McapContents, Overwrite, read_estimates, tum, write_estimates, write_folder,
-    write_mcap,
+    Estimate, Form, IngestReport, McapContents, Overwrite, read_estimates, tum, write_estimates,
+    write_folder, write_mcap,
 };
 use serde::Serialize;
 
@@ -81,7 +81,11 @@ fn estimates(path: &Path, input: &Input) -> anyhow::Result<BTreeMap<RobotId, Vec
     if within.is_file() {
         return Ok(read_estimates(&within)?);
     }
-    if input.ingest.form == Form::Mcap && path.is_file() { Ok(read_estimates(path)?) } else { Ok(BTreeMap::new()) }
+    if input.ingest.form == Form::Mcap && path.is_file() {
+        Ok(read_estimates(path)?)
+    } else {
+        Ok(BTreeMap::new())
+    }
 }
 
 /// The file to write, which must not be there.

@@ -27,10 +27,12 @@ pub fn open(path: &Path, mapping: Option<&Path>, skip_bad_rows: bool) -> anyhow:
     let mut files = opened.attachments;
     files.retain(|name, _| is_beside(name));
     let (folder, unpacked) = if files.is_empty() {
-        let folder = if from.is_dir() { from } else { from.parent().map(Path::to_path_buf).unwrap_or_default() };
+        let folder =
+            if from.is_dir() { from } else { from.parent().map(Path::to_path_buf).unwrap_or_default() };
         (folder, None)
     } else {
-        let folder = tempfile::tempdir().context("cannot create a folder for the files within the MCAP file")?;
+        let folder =
+            tempfile::tempdir().context("cannot create a folder for the files within the MCAP file")?;
         for (name, text) in files {
             let path = folder.path().join(name);
             std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;

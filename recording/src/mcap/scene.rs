@@ -6,10 +6,10 @@ use pleiad_estimation::geometry::Vector2;
 use pleiad_estimation::sample::{Reading, Relative};
 use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::frame;
-use super::views::{MAP, instant, pose};
+use super::views::{Instant, MAP, PoseView, Vector, instant, level, pose};
 use super::write::Estimate;
 use crate::types::{Recording, RobotRecording};
 
@@ -33,68 +33,119 @@ const COLOURS: [[f64; 3]; 7] = [
     [0.337, 0.706, 0.914],
     [0.941, 0.894, 0.259],
 ];
-const GREY: [f64; 4] = [0.5, 0.5, 0.5, 0.8];
+const GREY: Colour = Colour { r: 0.5, g: 0.5, b: 0.5, a: 0.8 };
 /// `LINE_STRIP`, `LINE_LOOP` and `LINE_LIST`.
 const STRIP: u8 = 0;
 const LOOP: u8 = 1;
 const SEGMENTS: u8 = 2;
 
-fn colour(robot: RobotId, opacity: f64) -> [f64; 4] {
+fn colour(robot: RobotId, a: f64) -> Colour {
     let [r, g, b] = COLOURS[robot.0.saturating_sub(1) as usize % COLOURS.len()];
-    [r, g, b, opacity]
+    Colour { r, g, b, a }
 }
 
-fn line(kind: u8, thickness: f64, [r, g, b, a]: [f64; 4], points: &[[f64; 2]]) -> Value {
-    let points: Vec<Value> = points.iter().map(|[x, y]| json!({ "x": x, "y": y, "z": 0.0 })).collect();
-    json!({
-        "type": kind,
-        "pose": pose(&Pose2::identity()),
-        "thickness": thickness,
-        "scale_invariant": true,
-        "points": points,
-        "color": { "r": r, "g": g, "b": b, "a": a },
-        "colors": [],
-        "indices": [],
-    })
+/// `foxglove.Color`.
+#[derive(Clone, Copy, Serialize)]
+struct Colour {
+    r: f64,
+    g: f64,
+    b: f64,
+    a: f64,
 }
 
-fn label(at: [f64; 2], text: &str, [r, g, b, a]: [f64; 4]) -> Value {
-    json!({
-        "pose": pose(&Pose2::new(at[0], at[1], 0.0)),
-        "billboard": true,
-        "font_size": 14.0,
-        "scale_invariant": true,
-        "color": { "r": r, "g": g, "b": b, "a": a },
-        "text": text,
-    })
+/// `foxglove.LinePrimitive`.
+#[derive(Serialize)]
+struct Line {
+    #[serde(rename = "type")]
+    kind: u8,
+    pose: PoseView,
+    thickness: f64,
+    scale_invariant: bool,
+    points: Vec<Vector>,
+    color: Colour,
+    colors: [Colour; 0],
+    indices: [u32; 0],
 }
 
-fn entity(time: Timestamp, id: &str, lines: &[Value], texts: &[Value]) -> Value {
-    json!({
-        "timestamp": instant(time),
-        "frame_id": MAP,
-        "id": id,
-        "lifetime": { "sec": 0, "nsec": 0 },
-        "frame_locked": false,
-        "metadata": [], "arrows": [], "cubes": [], "spheres": [], "cylinders": [],
-        "lines": lines,
-        "triangles": [],
-        "texts": texts,
-        "models": [],
-    })
+/// `foxglove.TextPrimitive`.
+#[derive(Serialize)]
+struct Label {
+    pose: PoseView,
+    billboard: bool,
+    font_size: f64,
+    scale_invariant: bool,
+    color: Colour,
+    text: String,
 }
 
-fn update(entities: &[Value]) -> Value {
-    json!({ "deletions": [], "entities": entities })
+/// Primitives that are never drawn.
+type Nothing = [(); 0];
+
+/// `foxglove.SceneEntity`.
+#[derive(Serialize)]
+struct Entity {
+    timestamp: Instant,
+    frame_id: &'static str,
+    id: String,
+    lifetime: Instant,
+    frame_locked: bool,
+    metadata: Nothing,
+    arrows: Nothing,
+    cubes: Nothing,
+    spheres: Nothing,
+    cylinders: Nothing,
+    lines: Vec<Line>,
+    triangles: Nothing,
+    texts: Vec<Label>,
+    models: Nothing,
+}
+
+/// `foxglove.SceneUpdate`.
+#[derive(Serialize)]
+pub(super) struct Update {
+    deletions: Nothing,
+    entities: [Entity; 1],
+}
+
+fn line(kind: u8, thickness: f64, color: Colour, points: &[[f64; 2]]) -> Line {
+    let points = points.iter().map(|point| level(*point)).collect();
+    let pose = pose(&Pose2::identity());
+    Line { kind, pose, thickness, scale_invariant: true, points, color, colors: [], indices: [] }
+}
+
+fn label([x, y]: [f64; 2], text: String, color: Colour) -> Label {
+    let pose = pose(&Pose2::new(x, y, 0.0));
+    Label { pose, billboard: true, font_size: 14.0, scale_invariant: true, color, text }
+}
+
+fn update(time: Timestamp, id: String, lines: Vec<Line>, texts: Vec<Label>) -> Update {
+    let entity = Entity {
+        timestamp: instant(time),
+        frame_id: MAP,
+        id,
+        // For ever, until the next of its name.
+        lifetime: instant(Timestamp(0)),
+        frame_locked: false,
+        metadata: [],
+        arrows: [],
+        cubes: [],
+        spheres: [],
+        cylinders: [],
+        lines,
+        triangles: [],
+        texts,
+        models: [],
+    };
+    Update { deletions: [], entities: [entity] }
 }
 
 /// Landmarks, walls and the true paths, told once.
-pub(super) fn world(time: Timestamp, recording: &Recording) -> Value {
+pub(super) fn world(time: Timestamp, recording: &Recording) -> Update {
     let mut crosses = Vec::new();
     let mut names = Vec::new();
     for (landmark, [x, y]) in &recording.landmarks {
         crosses.extend([[x - CROSS_M, *y], [x + CROSS_M, *y], [*x, y - CROSS_M], [*x, y + CROSS_M]]);
-        names.push(label([*x, *y], &format!("L{landmark}"), GREY));
+        names.push(label([*x, *y], format!("L{landmark}"), GREY));
     }
     let walls: Vec<[f64; 2]> =
         recording.walls.iter().flat_map(|[x0, y0, x1, y1]| [[*x0, *y0], [*x1, *y1]]).collect();
@@ -103,7 +154,7 @@ pub(super) fn world(time: Timestamp, recording: &Recording) -> Value {
         let path = thinned(robot.truth.iter().map(|truth| (truth.time, truth.pose)));
         lines.push(line(STRIP, 1.0, GREY, &path));
     }
-    update(&[entity(time, "world", &lines, &names)])
+    update(time, "world".to_owned(), lines, names)
 }
 
 /// One point per step of a path.
@@ -126,21 +177,22 @@ pub(super) fn robot(
     at: usize,
     since: Timestamp,
     channels: Option<&RobotRecording>,
-) -> Option<Value> {
+) -> Option<Update> {
     let now = estimates.get(at)?;
     let begin = now.time.plus_seconds(-TRAIL_S);
     let past = &estimates[estimates[..at].partition_point(|estimate| estimate.time < begin)..=at];
     let trail = thinned(past.iter().map(|estimate| (estimate.time, estimate.pose)));
     let place = [now.pose.x_m(), now.pose.y_m()];
     let ahead = now.pose.act(Vector2::new(0.3, 0.0));
-    let lines = [
+    let lines = vec![
         line(LOOP, 2.0, colour(robot, 1.0), &ellipse(place, &now.covariance).unwrap_or_default()),
         line(STRIP, 1.5, colour(robot, 0.6), &trail),
         line(STRIP, 4.0, colour(robot, 1.0), &[place, [ahead.x, ahead.y]]),
         line(SEGMENTS, 1.0, colour(robot, 0.4), &sights(estimates, since, now.time, channels)),
     ];
     let name = frame(robot);
-    Some(update(&[entity(now.time, &name, &lines, &[label(place, &name, colour(robot, 1.0))])]))
+    let label = label(place, name.clone(), colour(robot, 1.0));
+    Some(update(now.time, name, lines, vec![label]))
 }
 
 /// Lines from where the robot is estimated to what it saw after `since` and until `until`.

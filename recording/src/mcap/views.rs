@@ -7,7 +7,7 @@ use pleiad_ros::messages::builtin_interfaces::Time;
 use pleiad_ros::messages::geometry_msgs::{Point, Pose, PoseWithCovariance, Quaternion, TwistWithCovariance};
 use pleiad_ros::messages::nav_msgs::Odometry;
 use pleiad_ros::messages::std_msgs::Header;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::messages::parts;
 use super::write::{Estimate, LogLine};
@@ -15,51 +15,113 @@ use super::write::{Estimate, LogLine};
 /// The frame that everything is in.
 pub(super) const MAP: &str = "map";
 
-pub(super) fn instant(time: Timestamp) -> Value {
-    let (sec, nsec) = parts(time);
-    json!({ "sec": sec, "nsec": nsec })
+/// `time` and `duration`.
+#[derive(Serialize)]
+pub(super) struct Instant {
+    sec: i64,
+    nsec: i64,
 }
 
-/// The quaternion of a turn about the vertical.
+/// `foxglove.Vector3` and `foxglove.Point3`.
+#[derive(Serialize)]
+pub(super) struct Vector {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+/// `foxglove.Quaternion`.
+#[derive(Serialize)]
+struct Rotation {
+    x: f64,
+    y: f64,
+    z: f64,
+    w: f64,
+}
+
+/// `foxglove.Pose`.
+#[derive(Serialize)]
+pub(super) struct PoseView {
+    position: Vector,
+    orientation: Rotation,
+}
+
+/// `foxglove.PoseInFrame`.
+#[derive(Serialize)]
+pub(super) struct PoseInFrame {
+    timestamp: Instant,
+    frame_id: &'static str,
+    pose: PoseView,
+}
+
+/// `foxglove.FrameTransform`.
+#[derive(Serialize)]
+pub(super) struct FrameTransform<'a> {
+    timestamp: Instant,
+    parent_frame_id: &'static str,
+    child_frame_id: &'a str,
+    translation: Vector,
+    rotation: Rotation,
+}
+
+/// `foxglove.Log`.
+#[derive(Serialize)]
+pub(super) struct Log<'a> {
+    timestamp: Instant,
+    level: u8,
+    message: &'a str,
+    name: &'a str,
+    file: &'static str,
+    line: u32,
+}
+
+pub(super) fn instant(time: Timestamp) -> Instant {
+    let (sec, nsec) = parts(time);
+    Instant { sec, nsec }
+}
+
+/// A point of the plane.
+pub(super) fn level([x, y]: [f64; 2]) -> Vector {
+    Vector { x, y, z: 0.0 }
+}
+
+/// The quaternion of a turn about the vertical: its last two numbers.
 fn half_turn(pose: &Pose2) -> Vector2 {
     Pose2::new(0.0, 0.0, 0.5 * pose.yaw_rad()).rotate(Vector2::new(1.0, 0.0))
 }
 
-fn rotation(pose: &Pose2) -> Value {
+fn rotation(pose: &Pose2) -> Rotation {
     let half = half_turn(pose);
-    json!({ "x": 0.0, "y": 0.0, "z": half.y, "w": half.x })
+    Rotation { x: 0.0, y: 0.0, z: half.y, w: half.x }
 }
 
-pub(super) fn pose(pose: &Pose2) -> Value {
-    json!({
-        "position": { "x": pose.x_m(), "y": pose.y_m(), "z": 0.0 },
-        "orientation": rotation(pose),
-    })
+pub(super) fn pose(pose: &Pose2) -> PoseView {
+    PoseView { position: level([pose.x_m(), pose.y_m()]), orientation: rotation(pose) }
 }
 
-pub(super) fn pose_in_frame(time: Timestamp, of: &Pose2) -> Value {
-    json!({ "timestamp": instant(time), "frame_id": MAP, "pose": pose(of) })
+pub(super) fn pose_in_frame(time: Timestamp, of: &Pose2) -> PoseInFrame {
+    PoseInFrame { timestamp: instant(time), frame_id: MAP, pose: pose(of) }
 }
 
-pub(super) fn frame_transform(time: Timestamp, child: &str, of: &Pose2) -> Value {
-    json!({
-        "timestamp": instant(time),
-        "parent_frame_id": MAP,
-        "child_frame_id": child,
-        "translation": { "x": of.x_m(), "y": of.y_m(), "z": 0.0 },
-        "rotation": rotation(of),
-    })
+pub(super) fn frame_transform<'a>(time: Timestamp, child: &'a str, of: &Pose2) -> FrameTransform<'a> {
+    FrameTransform {
+        timestamp: instant(time),
+        parent_frame_id: MAP,
+        child_frame_id: child,
+        translation: level([of.x_m(), of.y_m()]),
+        rotation: rotation(of),
+    }
 }
 
-pub(super) fn log(line: &LogLine) -> Value {
-    json!({
-        "timestamp": instant(line.time),
-        "level": line.level as u8,
-        "message": line.message,
-        "name": line.name,
-        "file": "",
-        "line": 0,
-    })
+pub(super) fn log(line: &LogLine) -> Log<'_> {
+    Log {
+        timestamp: instant(line.time),
+        level: line.level as u8,
+        message: &line.message,
+        name: &line.name,
+        file: "",
+        line: 0,
+    }
 }
 
 /// Says of a covariance of ROS that nobody knows it.

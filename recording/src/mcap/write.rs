@@ -11,6 +11,7 @@ use pleiad_estimation::symmetric::Symmetric3;
 use pleiad_estimation::{Pose2, RobotId, Timestamp};
 use pleiad_ros::Message as _;
 use pleiad_ros::messages::nav_msgs::Odometry;
+use serde::Serialize;
 use serde_json::Value;
 
 use super::{
@@ -98,7 +99,7 @@ pub fn write_mcap(path: &Path, contents: &McapContents<'_>) -> Result<(), Record
     if !contents.logs.is_empty() {
         let log = file.channel("/log", &schemas::log());
         for line in &contents.logs {
-            file.push(log, line.time, Box::new(move || Ok(bytes(&views::log(line)))));
+            file.push(log, line.time, Box::new(move || bytes(&views::log(line))));
         }
     }
     let mut name = path.file_name().unwrap_or_default().to_os_string();
@@ -124,8 +125,8 @@ struct ChannelSpec {
     schema_text: String,
 }
 
-fn bytes(value: &Value) -> Vec<u8> {
-    value.to_string().into_bytes()
+fn bytes(view: &impl Serialize) -> Result<Vec<u8>, String> {
+    serde_json::to_vec(view).map_err(|error| error.to_string())
 }
 
 impl<'a> Output<'a> {
@@ -284,13 +285,13 @@ fn first_stamp(recording: &Recording) -> Timestamp {
 fn view_world<'a>(file: &mut Output<'a>, recording: &'a Recording) {
     let first = first_stamp(recording);
     let channel = file.channel("/scene/world", &schemas::scene_update());
-    file.push(channel, first, Box::new(move || Ok(bytes(&scene::world(first, recording)))));
+    file.push(channel, first, Box::new(move || bytes(&scene::world(first, recording))));
     for (&robot, channels) in recording.robots.iter().filter(|(_, channels)| !channels.truth.is_empty()) {
         let channel = file.channel(&topic(robot, "truth_pose"), &schemas::pose_in_frame());
         let mut last: Option<Timestamp> = None;
         for truth in &channels.truth {
             if last.is_none_or(|last| truth.time.seconds_since(last) >= TRUTH_STEP_S) {
-                let view = move || Ok(bytes(&views::pose_in_frame(truth.time, &truth.pose)));
+                let view = move || bytes(&views::pose_in_frame(truth.time, &truth.pose));
                 file.push(channel, truth.time, Box::new(view));
                 last = Some(truth.time);
             }
@@ -320,8 +321,8 @@ fn view_robot<'a>(
     let mut last: Option<Timestamp> = None;
     for (at, estimate) in estimates.iter().enumerate() {
         let Estimate { time, pose: of, .. } = *estimate;
-        file.push(pose, time, Box::new(move || Ok(bytes(&views::pose_in_frame(time, &of)))));
-        let moved = move || Ok(bytes(&views::frame_transform(time, &frame(robot), &of)));
+        file.push(pose, time, Box::new(move || bytes(&views::pose_in_frame(time, &of))));
+        let moved = move || bytes(&views::frame_transform(time, &frame(robot), &of));
         file.push(transform, time, Box::new(moved));
         if let Some(message) = views::odometry(estimate, &frame(robot)) {
             let render = move || pleiad_ros::to_cdr(&message).map_err(|error| error.to_string());
@@ -331,7 +332,7 @@ fn view_robot<'a>(
             let since = last.unwrap_or(time);
             let view = move || {
                 let view = scene::robot(robot, estimates, at, since, channels);
-                view.map(|view| bytes(&view)).ok_or_else(|| "an estimate that is not there".to_owned())
+                bytes(&view.ok_or("an estimate that is not there")?)
             };
             file.push(update, time, Box::new(view));
             last = Some(time);
