@@ -16,6 +16,8 @@ mod evaluate;
 mod found;
 #[path = "command_line/help.rs"]
 mod help;
+#[path = "command_line/interchange.rs"]
+mod interchange;
 #[path = "command_line/json.rs"]
 mod json;
 #[path = "command_line/models.rs"]

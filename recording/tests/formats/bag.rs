@@ -477,6 +477,33 @@ fn bags_of_other_kinds_are_refused_with_what_to_do() {
     assert_eq!(robot(&unstamped("").read().0).commands[0].time, Timestamp(3));
 }
 
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn a_bag_with_changed_bytes_is_read_or_refused(
+        changes in proptest::collection::vec((proptest::prelude::any::<usize>(), proptest::prelude::any::<u8>()), 1..6),
+    ) {
+        let done = small().done(ODOMETRY);
+        let mut bytes = fs::read(&done.path).expect("written");
+        for (at, value) in changes {
+            let at = at % bytes.len();
+            bytes[at] = value;
+        }
+        fs::write(&done.path, &bytes).expect("written");
+        if let Ok((recording, _)) = open(&done.path, &ReadOptions::default()) {
+            proptest::prop_assert_eq!(robot(&recording).odometry.len(), 2);
+        }
+    }
+
+    #[test]
+    fn any_bytes_behind_the_magic_are_refused(bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..300)) {
+        let done = small().done(ODOMETRY);
+        fs::write(&done.path, [&b"\x89MCAP0\r\n"[..], &bytes].concat()).expect("written");
+        proptest::prop_assert!(done.refusal().contains("cannot be read as MCAP"));
+    }
+}
+
 /// A folder of csv files with a mapping.
 fn tables(files: &[(&str, &str)]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -1,4 +1,5 @@
-//! What others say of our files and we of theirs: the Python packages rosbags, mcap, pymap3d and evo.
+//! What others say of our files and we of theirs: the Python packages rosbags, mcap, pymap3d, evo and
+//! foxglove-schemas-protobuf.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests fail by panicking")]
 

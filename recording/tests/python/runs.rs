@@ -1,5 +1,5 @@
 //! A file that we wrote is read by the reference implementation of MCAP in Python, and its CDR by rosbags from the
-//! definitions in the file alone.
+//! definitions in the file alone; views are what Foxglove's definitions of their schemas allow.
 
 use std::collections::BTreeMap;
 
@@ -101,6 +101,14 @@ fn python_reads_a_run_to_the_bit() {
     assert_eq!(
         found["schemas"]["/robot1/estimate_odometry"],
         json!(["nav_msgs/msg/Odometry", "ros2msg", "cdr"])
+    );
+    // 300 true poses of which every fifth is shown, a view every half second of six.
+    assert_eq!(
+        found["foxglove"],
+        json!({
+            "foxglove.FrameTransform": 60, "foxglove.Log": 1, "foxglove.PoseInFrame": 60 + 60,
+            "foxglove.SceneUpdate": 1 + 12
+        })
     );
     let told = json!({ "format_version": "3", "name": recording.name, "robots": "1" });
     assert_eq!(found["metadata"], json!([["pleiad", told]]));

@@ -59,8 +59,9 @@ pub(super) fn choose(args: &DiagnoseArgs) -> anyhow::Result<Chosen> {
     Ok(Chosen { recordings, fit_on, test_on, notes: notes.collect() })
 }
 
-/// The name of the folder that was given.
+/// The name of the folder or, without its ending, of the file that was given.
 fn name(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    whole.file_name().map_or_else(|| whole.display().to_string(), |name| name.to_string_lossy().into_owned())
+    let own = if whole.is_file() { whole.file_stem() } else { whole.file_name() };
+    own.map_or_else(|| whole.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
