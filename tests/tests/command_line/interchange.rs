@@ -1,5 +1,6 @@
 //! `run.mcap`, `pleiad export`, and recordings of other tools through a mapping.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use pleiad_tests::program::{run, turn};
@@ -106,10 +107,11 @@ fn foreign(within: &Path) {
             let rows: String = rows.lines().map(nanos).collect();
             let file = format!("{channel}_{robot}.csv");
             std::fs::write(within.join("logs").join(&file), format!("{}\n{rows}", names.join(","))).unwrap();
-            mapping.push_str(&format!(
+            let _ = write!(
+                mapping,
                 "[[csv]]\nfile = \"{file}\"\nrobot = {robot}\nchannel = \"{channel}\"\ntime_unit = \"ns\"\n\
                  columns = {names:?}\n"
-            ));
+            );
         }
     }
     std::fs::write(within.join("any.toml"), mapping).unwrap();
