@@ -27,9 +27,10 @@ pub fn open(path: &Path, mapping: Option<&Path>, skip_bad_rows: bool) -> anyhow:
     let mut files = opened.attachments;
     files.retain(|name, _| is_beside(name));
     let (folder, unpacked) = if files.is_empty() {
-        let folder =
-            if from.is_dir() { from } else { from.parent().map(Path::to_path_buf).unwrap_or_default() };
-        (folder, None)
+        // A bare name has the empty path as its parent, which no system lists.
+        let parent = from.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let beside = if from.is_dir() { from.as_path() } else { parent.unwrap_or(Path::new(".")) };
+        (beside.to_path_buf(), None)
     } else {
         let folder =
             tempfile::tempdir().context("cannot create a folder for the files within the MCAP file")?;

@@ -134,6 +134,10 @@ fn csv_files_of_other_tools_are_replayed_through_a_mapping() {
         let (made, recorded) = (format!("made/r1/{name}.csv"), format!("recording/r1/{name}.csv"));
         assert_eq!(file(&made), file(&recorded), "to the bit");
     }
+    // With nothing beside them that a replay has to know, and by bare names.
+    run(folder.path(), ["export", "made", "--to", "mcap", "--out", "plain.mcap"]).success();
+    run(folder.path(), ["export", "plain.mcap", "--to", "csv", "--out", "plain"]).success();
+    assert_eq!(file("plain/r2/truth.csv"), file("made/r2/truth.csv"));
     let told = run(folder.path(), ["observability", "logs/gps_1.csv"]).failure();
     assert!(told.contains("there is no mapping") && told.contains("mapping.toml"), "{told}");
 }
