@@ -196,12 +196,10 @@ fn what_cannot_be_tuned_is_refused_with_what_to_do() {
     let noise = std::fs::read_to_string(folder.path().join("noise.toml")).unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("blind.toml", noise.split("[sensors]").next().unwrap());
-    write("additive.toml", &format!("[filter]\nerror = \"additive\"\n{noise}"));
     write("joining.toml", &format!("[filter]\njoin = true\n{noise}"));
     write("calibrated.toml", &format!("{noise}[calibration]\nsigma_forward_scale = 0.01\n"));
     for (arguments, words) in [
         (&["--noise", "blind.toml"][..], &["no observation", "pleiad replay"][..]),
-        (&["--noise", "additive.toml"], &["filter.error", "invariant"]),
         (&["--noise", "joining.toml"], &["filter.join", "take it out"]),
         (&["--noise", "calibrated.toml"], &["[calibration]", "take the table out"]),
         (&["--noise", "noise.toml", "--also", "sensors.bearing.sigma_rad"], &["sensors.bearing.sigma_rad"]),
