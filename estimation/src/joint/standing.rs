@@ -16,7 +16,7 @@ pub struct Contradiction {
     pub of: Party,
     /// Logarithm of the odds that they are wrong since it was last zero, nats.
     pub level: f64,
-    /// How many readings there were, each forgotten over the next [`MEMORY`].
+    /// How many readings there were, the earlier ones forgotten over some sixty.
     pub readings: f64,
     /// How many of them surprised.
     pub surprises: f64,
