@@ -22,21 +22,9 @@ fn judged(config: FoldConfig, world: World<'_>) -> (f64, f64) {
         let mut ledger = team.ledger(config);
         let joint = ledger.settle();
         square += team.error_m(joint).powi(2) / RUNS as f64;
-        nees += nees_of_positions(&team, joint) / (RUNS * 8) as f64;
+        nees += team.nees_of_positions(joint) / RUNS as f64;
     }
     (square.sqrt(), nees)
-}
-
-fn nees_of_positions(team: &Run, joint: &Joint) -> f64 {
-    let time = Timestamp(team.ticks * TICK_NS);
-    let of = |(robot, number): (&support::wander::Robot, u32)| {
-        let state = robot.trajectory.at(time).expect("kept");
-        let (pose, covariance) = joint.estimate(RobotId(number), time, &state).expect("placed");
-        let [xx, xy, yy, ..] = covariance.0;
-        let error = robot.at_label(team.ticks).position() - pose.position();
-        (error.x * error.x * yy - 2.0 * error.x * error.y * xy + error.y * error.y * xx) / (xx * yy - xy * xy)
-    };
-    team.robots.iter().zip(1..).map(of).sum()
 }
 
 fn told() -> FoldConfig {

@@ -88,8 +88,9 @@ impl Reputation {
         }
         let mut words = vec![self.noise_level.to_bits()];
         words.extend(self.doubt.map(f64::to_bits));
-        words.extend(self.detached.map(|at| at.0.cast_unsigned()));
-        words.extend(self.distrust.iter().flat_map(|of| [of.since.0.cast_unsigned(), u64::from(of.whole)]));
+        words.extend(self.detached.map_or([0, 0], |at| [1, at.0.cast_unsigned()]));
+        words
+            .extend(self.distrust.map_or([0, 0], |of| [1 + u64::from(of.whole), of.since.0.cast_unsigned()]));
         words
     }
 }
@@ -120,6 +121,7 @@ const LOOK_NS: i64 = 1_000_000_000;
 const CAP: f64 = 2.0;
 /// From here on two contradict each other, nats: one surprise where they are rare.
 const CONTRADICTS: f64 = 1.5;
+
 /// What a reading was, as far as its standing goes.
 pub(crate) struct Surprise {
     pub time: Timestamp,

@@ -260,7 +260,8 @@ impl Ledger {
     /// Rough size of what is kept in memory: entries, facts, and answers.
     pub fn kept(&self) -> usize {
         let entries: usize = self.logs.values().map(|log| log.entries().len() + log.waiting()).sum();
-        entries + self.facts.len() + self.answers.len() + self.pending.len()
+        let naming = self.naming.owed.len() + self.naming.others.len();
+        entries + self.facts.len() + self.answers.len() + self.pending.len() + naming
     }
 
     /// Everything kept beyond the last cut, to be written to a new journal after the snapshot.

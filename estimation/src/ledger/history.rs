@@ -39,7 +39,7 @@ impl Ledger {
             return points;
         }
         for (key, record) in &self.facts {
-            let others = |id, robot| self.naming.others.get(&(id, robot)).copied();
+            let others = |id, robot| self.other_half(id, robot);
             fold_among(&mut joint, &self.config, key, &record.fact, &others);
             add(&joint, key.time);
         }

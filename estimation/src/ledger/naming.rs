@@ -15,7 +15,7 @@ pub(super) struct Naming {
     /// For whom this ledger is kept.
     owner: Option<RobotId>,
     /// What it has not answered yet.
-    owed: BTreeMap<EntryId, Timestamp>,
+    pub owed: BTreeMap<EntryId, Timestamp>,
     pub others: Others,
 }
 
@@ -25,6 +25,11 @@ impl Ledger {
     pub fn kept_for(mut self, owner: RobotId) -> Self {
         self.naming.owner = Some(owner);
         self
+    }
+
+    /// Where a robot was that a sighting does not name, and on which boot, if names may be wrong and it has answered.
+    pub fn other_half(&self, id: EntryId, robot: RobotId) -> Option<(BootIndex, NominalState)> {
+        self.naming.others.get(&(id, robot)).copied()
     }
 
     pub(super) fn names_may_be_wrong(&self) -> bool {

@@ -92,6 +92,8 @@ pub struct World<'a> {
     pub landmarks: &'a [[f64; 2]],
     /// Everybody knows where the landmarks are.
     pub known: bool,
+    /// So far the first of them is from where everybody thinks, m.
+    pub misplaced_m: f64,
     /// Share of sightings of landmarks that name another one.
     pub misnamed: f64,
     /// Share of sightings of robots that name another one.
@@ -131,12 +133,14 @@ pub struct Lie {
     pub sighting: [f64; 2],
     /// Added to the nominal positions with which it answers, m.
     pub answer_m: f64,
+    /// Added to the ranges of landmarks, m.
+    pub landmark_m: f64,
 }
 
 impl Lie {
     /// A robot that says what it should.
     pub fn none(robot: usize, from: i64) -> Self {
-        Self { robot, from, fix_m: [0.0; 2], sighting: [0.0; 2], answer_m: 0.0 }
+        Self { robot, from, fix_m: [0.0; 2], sighting: [0.0; 2], answer_m: 0.0, landmark_m: 0.0 }
     }
 }
 
@@ -163,6 +167,7 @@ impl Default for World<'_> {
             all_gps: false,
             landmarks: &[],
             known: false,
+            misplaced_m: 0.0,
             misnamed: 0.0,
             mistaken: 0.0,
             all_answer: false,
@@ -304,7 +309,8 @@ fn see_landmark(
 ) {
     let seen = run.robots[robot].at_label(tick).between(&Pose2::new(x, y, 0.0)).position();
     if seen.norm() < VIEW_M {
-        let relative = reading(seen, random);
+        let told = world.lies(robot, tick).map_or(0.0, |lie| lie.landmark_m);
+        let relative = reading(seen * (1.0 + told / seen.norm()), random);
         let mut name = landmark;
         if world.swapped && landmark < 2 {
             name = 1 - landmark;
@@ -314,7 +320,9 @@ fn see_landmark(
         }
         let landmark = LandmarkId(name as u32);
         let quantity = if world.known {
-            Quantity::Landmark { landmark, position_m: world.landmarks[name], relative }
+            let [x, y] = world.landmarks[name];
+            let off = if name == 0 { world.misplaced_m } else { 0.0 };
+            Quantity::Landmark { landmark, position_m: [x + off, y], relative }
         } else {
             Quantity::Feature { landmark, relative }
         };
@@ -401,7 +409,13 @@ impl Run {
 
     /// Errors of position of all robots at the end, by what is published, root mean square in metres.
     pub fn error_m(&self, joint: &Joint) -> f64 {
-        let square = self.robots.iter().zip(1..).map(|(robot, number)| {
+        self.error_without_m(joint, 0)
+    }
+
+    /// The same without one of them.
+    pub fn error_without_m(&self, joint: &Joint, without: u32) -> f64 {
+        let of = || self.robots.iter().zip(1..).filter(|(_, number)| *number != without);
+        let square = of().map(|(robot, number)| {
             let time = Timestamp(self.ticks * TICK_NS);
             let state = robot.trajectory.at(time).expect("kept");
             let (pose, _) = joint.estimate(RobotId(number), time, &state).expect("placed");
@@ -409,6 +423,20 @@ impl Run {
             let truth = &robot.truth[(self.ticks + BEFORE) as usize];
             (pose.position() - truth.position()).norm_squared()
         });
-        (square.sum::<f64>() / self.robots.len() as f64).sqrt()
+        (square.sum::<f64>() / of().count() as f64).sqrt()
+    }
+
+    /// Normalized squared errors of position of all robots at the end, over their dimension: 1 if the filter is right about itself.
+    pub fn nees_of_positions(&self, joint: &Joint) -> f64 {
+        let time = Timestamp(self.ticks * TICK_NS);
+        let of = |(robot, number): (&Robot, u32)| {
+            let state = robot.trajectory.at(time).expect("kept");
+            let (pose, covariance) = joint.estimate(RobotId(number), time, &state).expect("placed");
+            let [xx, xy, yy, ..] = covariance.0;
+            let error = robot.at_label(self.ticks).position() - pose.position();
+            (error.x * error.x * yy - 2.0 * error.x * error.y * xy + error.y * error.y * xx)
+                / (xx * yy - xy * xy)
+        };
+        self.robots.iter().zip(1..).map(of).sum::<f64>() / (2 * self.robots.len()) as f64
     }
 }

@@ -11,7 +11,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 
 use crate::error::RecordingError;
 
-/// Longest record that is read, compressed chunks aside: a message of that size is none of ours.
+/// Longest record that is read, and longest chunk before and after it is unpacked: a message of that size is none of ours.
 const RECORD_LIMIT: usize = 128 << 20;
 /// What is asked of the file at once, whatever length it claims for a record.
 const READ_AT_ONCE: usize = 1 << 20;
@@ -55,7 +55,8 @@ pub(crate) fn scan(
 ) -> Result<(), RecordingError> {
     let mut file = File::open(path).map_err(RecordingError::io("read", path))?;
     let options = LinearReaderOptions::default()
-        .with_validate_chunk_crcs(true)
+        // Before anything in a chunk is believed: lengths in it are followed without a look at where it ends.
+        .with_prevalidate_chunk_crcs(true)
         .with_validate_data_section_crc(true)
         .with_record_length_limit(RECORD_LIMIT);
     let mut reader = LinearReader::new_with_options(options);

@@ -1,14 +1,14 @@
-//! ROS 2 bags and foreign csv files become recordings through a mapping.
+//! ROS 2 bags become recordings through a mapping.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use mcap::records::MessageHeader;
 use pleiad_estimation::sample::{Reading, Relative, Target};
 use pleiad_estimation::{LandmarkId, Pose2, RobotId, Timestamp};
-use pleiad_recording::{Form, IngestReport, ReadOptions, Recording, RobotRecording, open, open_mapped};
+use pleiad_recording::{Form, IngestReport, ReadOptions, Recording, RobotRecording, open};
 use pleiad_ros::messages::builtin_interfaces::Time;
 use pleiad_ros::messages::geometry_msgs::{
     Point, Pose, PoseStamped, Quaternion, Transform, TransformStamped, Twist, Vector3,
@@ -22,7 +22,7 @@ use pleiad_ros::{Message, to_cdr};
 /// Seconds of Unix time that all stamps begin at.
 const START: i32 = 1_700_000_000;
 
-fn header(seconds: i32, frame: &str) -> Header {
+pub(super) fn header(seconds: i32, frame: &str) -> Header {
     Header { stamp: Time { sec: START + seconds, nanosec: 5 }, frame_id: frame.to_owned() }
 }
 
@@ -39,31 +39,34 @@ fn pose(x: f64, y: f64, yaw: f64) -> Pose {
 }
 
 /// A bag in a folder with its mapping.
-struct Bag {
+pub(super) struct Bag {
     folder: tempfile::TempDir,
-    writer: mcap::Writer<fs::File>,
+    pub(super) writer: mcap::Writer<fs::File>,
 }
 
 impl Bag {
-    fn new(compression: Option<mcap::Compression>) -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let file = fs::File::create(folder.path().join("bag_0.mcap")).expect("created");
-        let options = mcap::WriteOptions::new().compression(compression).profile("ros2");
-        Self { folder, writer: options.create(file).expect("begun") }
+    pub(super) fn new(compression: Option<mcap::Compression>) -> Self {
+        Self::with(mcap::WriteOptions::new().compression(compression))
     }
 
-    fn add<M: Message>(&mut self, topic: &str, message: &M, log_time: u64) {
+    pub(super) fn with(options: mcap::WriteOptions) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let file = fs::File::create(folder.path().join("bag_0.mcap")).expect("created");
+        Self { folder, writer: options.profile("ros2").create(file).expect("begun") }
+    }
+
+    pub(super) fn add<M: Message>(&mut self, topic: &str, message: &M, log_time: u64) {
         self.add_bytes(topic, M::NAME, &M::description().text(), &to_cdr(message).expect("CDR"), log_time);
     }
 
-    fn add_bytes(&mut self, topic: &str, name: &str, text: &str, data: &[u8], log_time: u64) {
+    pub(super) fn add_bytes(&mut self, topic: &str, name: &str, text: &str, data: &[u8], log_time: u64) {
         let schema = self.writer.add_schema(name, "ros2msg", text.as_bytes()).expect("added");
         let channel = self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).expect("added");
         let header = MessageHeader { channel_id: channel, sequence: 0, log_time, publish_time: 0 };
         self.writer.write_to_known_channel(&header, data).expect("written");
     }
 
-    fn done(mut self, mapping: &str) -> Done {
+    pub(super) fn done(mut self, mapping: &str) -> Done {
         self.writer.finish().expect("finished");
         let path = self.folder.path().join("bag_0.mcap");
         fs::write(self.folder.path().join("mapping.toml"), mapping).expect("written");
@@ -71,22 +74,22 @@ impl Bag {
     }
 }
 
-struct Done {
+pub(super) struct Done {
     _folder: tempfile::TempDir,
-    path: PathBuf,
+    pub(super) path: PathBuf,
 }
 
 impl Done {
-    fn read(&self) -> (Recording, IngestReport) {
+    pub(super) fn read(&self) -> (Recording, IngestReport) {
         open(&self.path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    fn refusal(&self) -> String {
+    pub(super) fn refusal(&self) -> String {
         open(&self.path, &ReadOptions::default()).expect_err("refused").to_string()
     }
 }
 
-fn robot(recording: &Recording) -> &RobotRecording {
+pub(super) fn robot(recording: &Recording) -> &RobotRecording {
     &recording.robots[&RobotId(1)]
 }
 
@@ -99,7 +102,7 @@ fn odometry(seconds: i32, x: f64, speed: f64) -> Odometry {
     message
 }
 
-const ODOMETRY: &str = "
+pub(super) const ODOMETRY: &str = "
 [[topic]]
 topic = \"/robot1/odom\"
 robot = 1
@@ -107,8 +110,12 @@ channel = \"velocity\"
 ";
 
 /// A bag of two odometry messages.
-fn small() -> Bag {
-    let mut bag = Bag::new(None);
+pub(super) fn small() -> Bag {
+    small_with(mcap::WriteOptions::new().compression(None))
+}
+
+pub(super) fn small_with(options: mcap::WriteOptions) -> Bag {
+    let mut bag = Bag::with(options);
     bag.add("/robot1/odom", &odometry(0, 0.0, 0.5), 7);
     bag.add("/robot1/odom", &odometry(1, 0.5, 0.75), 9);
     bag
@@ -368,203 +375,4 @@ fn a_damaged_message_is_named_with_its_field() {
         error.contains("message 3: found nav_msgs/msg/Odometry, field pose.covariance[0], byte 100"),
         "{error}"
     );
-}
-
-/// The message that a mapping of [`small`] is refused with.
-fn refused(mapping: &str) -> String {
-    small().done(mapping).refusal()
-}
-
-#[test]
-fn a_mapping_that_does_not_fit_is_refused_with_its_place() {
-    for (from, to, expected) in [
-        ("/robot1/odom", "/odom", "topic[1] (/odom): the bag has no topic `/odom`"),
-        ("velocity", "gyro", "found `gyro`, but nav_msgs/msg/Odometry gives velocity, increment"),
-        ("velocity", "velocty", "found `velocty`, expected one of command, wheel_odometry, velocity"),
-        ("velocity", "velocty", "did you mean `velocity`?"),
-        ("robot = 1", "robot = 1\nspeed = 2", "unknown field `speed`"),
-        (
-            "robot = 1",
-            "robot = 1\nscale = [1.0, 2.0, 3.0]",
-            "found 3 numbers, expected one, or one for each of v, w",
-        ),
-        ("robot = 1", "robot = 1\nscale = [0.0]", "expected finite numbers other than 0"),
-        (
-            "robot = 1",
-            "robot = 1\ntarget = { robot = 2 }",
-            "expected for channel `relative` and for no other",
-        ),
-        ("robot = 1", "robot = 1\nframe = \"map\"", "message 1: found the frame `odom`, expected `map`"),
-        ("robot = 1", "robot = 1\nmax_tilt_rad = 4", "found 4, expected an angle from 0 to pi"),
-        ("velocity", "truth", "robot 1 cannot be localized without odometry; map a topic to velocity"),
-        (ODOMETRY, "name = \"x\"", "found neither [[topic]] nor [[csv]]"),
-        (
-            ODOMETRY,
-            "origin = { latitude_deg = 91, longitude_deg = 0 }\n[[topic]]\ntopic=\"/a\"\nrobot=1\n\
-                    channel=\"gps\"",
-            "origin: expected a latitude from -90 to 90",
-        ),
-    ] {
-        let error = refused(&ODOMETRY.replace(from, to));
-        assert!(error.contains(expected), "{expected}\n{error}");
-    }
-    assert!(
-        refused(&ODOMETRY.replace("/robot1/odom", "/odom"))
-            .contains("\n  /robot1/odom (nav_msgs/msg/Odometry)")
-    );
-    let both = format!("{ODOMETRY}{}", ODOMETRY.replace("velocity", "increment"));
-    assert!(refused(&both).contains("velocity and increment of robot 1, expected only one"));
-}
-
-#[test]
-fn what_a_bag_holds_is_told_where_nobody_says_what_it_is() {
-    let mut bag = small();
-    bag.add_bytes("/scan", "sensor_msgs/msg/LaserScan", "", &[], 0);
-    let done = bag.done("");
-    fs::remove_file(done.path.with_file_name("mapping.toml")).expect("removed");
-    let error = done.refusal();
-    assert!(error.contains("there is no mapping") && error.contains("--mapping"), "{error}");
-    assert!(error.contains("/robot1/odom (nav_msgs/msg/Odometry)\n"), "{error}");
-    assert!(error.contains("/scan (sensor_msgs/msg/LaserScan, not read)"), "{error}");
-    // Elsewhere than beside the bag, it is named.
-    let other = tempfile::tempdir().expect("a temporary folder");
-    let mapping = other.path().join("any.toml");
-    fs::write(&mapping, ODOMETRY).expect("written");
-    let opened = open_mapped(&done.path, Some(&mapping), &ReadOptions::default()).expect("mapped");
-    assert_eq!(robot(&opened.recording).odometry.len(), 2);
-    assert!(opened.report.warnings.contains(&"topics that the mapping leaves out: /scan".to_owned()));
-}
-
-#[test]
-fn frames_are_asked_for_and_those_that_there_are_are_told() {
-    let tf = "[[topic]]\ntopic = \"/tf\"\nrobot = 1\nchannel = \"truth\"\n";
-    let with = |more: &str| {
-        let mut bag = small();
-        let transform = TransformStamped {
-            header: header(0, "odom"),
-            child_frame_id: "base".to_owned(),
-            transform: Transform::default(),
-        };
-        bag.add("/tf", &TFMessage { transforms: vec![transform] }, 0);
-        bag.done(&format!("{ODOMETRY}{tf}{more}")).refusal()
-    };
-    assert!(with("").contains("name the two that are meant in `frame` and `child_frame`"));
-    let error = with("frame = \"map\"\nchild_frame = \"base\"");
-    assert!(error.contains("no transform from `map` to `base`; it has odom -> base"), "{error}");
-}
-
-#[test]
-fn bags_of_other_kinds_are_refused_with_what_to_do() {
-    let mut bag = small();
-    let schema = bag.writer.add_schema("geometry_msgs/Twist", "ros1msg", b"").expect("added");
-    let channel = bag.writer.add_channel(schema, "/cmd", "ros1", &BTreeMap::new()).expect("added");
-    let header = MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
-    bag.writer.write_to_known_channel(&header, &[]).expect("written");
-    let mapping = format!("{ODOMETRY}[[topic]]\ntopic = \"/cmd\"\nrobot = 1\nchannel = \"command\"\n");
-    let error = bag.done(&mapping).refusal();
-    assert!(error.contains("found messages written as `ros1`, expected `cdr`"), "{error}");
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    fs::write(folder.path().join("bag_0.db3"), "SQLite format 3").expect("written");
-    fs::write(folder.path().join("mapping.toml"), ODOMETRY).expect("written");
-    let error = open(folder.path(), &ReadOptions::default()).expect_err("refused").to_string();
-    assert!(error.contains("convert it with `ros2 bag convert`"), "{error}");
-    let unstamped = |time: &str| {
-        let mut bag = small();
-        bag.add("/cmd", &Twist::default(), 3);
-        bag.done(&format!("{mapping}{time}"))
-    };
-    assert!(unstamped("time = \"header\"").refusal().contains("geometry_msgs/msg/Twist has none"));
-    assert_eq!(robot(&unstamped("").read().0).commands[0].time, Timestamp(3));
-}
-
-proptest::proptest! {
-    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(300))]
-
-    #[test]
-    fn a_bag_with_changed_bytes_is_read_or_refused(
-        changes in proptest::collection::vec((proptest::prelude::any::<usize>(), proptest::prelude::any::<u8>()), 1..6),
-    ) {
-        let done = small().done(ODOMETRY);
-        let mut bytes = fs::read(&done.path).expect("written");
-        for (at, value) in changes {
-            let at = at % bytes.len();
-            bytes[at] = value;
-        }
-        fs::write(&done.path, &bytes).expect("written");
-        if let Ok((recording, _)) = open(&done.path, &ReadOptions::default()) {
-            proptest::prop_assert_eq!(robot(&recording).odometry.len(), 2);
-        }
-    }
-
-    #[test]
-    fn any_bytes_behind_the_magic_are_refused(bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..300)) {
-        let done = small().done(ODOMETRY);
-        fs::write(&done.path, [&b"\x89MCAP0\r\n"[..], &bytes].concat()).expect("written");
-        proptest::prop_assert!(done.refusal().contains("cannot be read as MCAP"));
-    }
-}
-
-/// A folder of csv files with a mapping.
-fn tables(files: &[(&str, &str)]) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    for (name, text) in files {
-        fs::write(folder.path().join(name), text).expect("written");
-    }
-    folder
-}
-
-const CSV: &str = r#"
-[[csv]]
-file = "wheels.csv"
-robot = 3
-channel = "velocity"
-columns = ["stamp_ms", "speed_kmh", "turn_deg_s"]
-time_unit = "ms"
-scale = [0.5, 0.25]
-"#;
-
-fn read_tables(folder: &Path) -> Result<(Recording, IngestReport), String> {
-    open(folder, &ReadOptions::default()).map_err(|error| error.to_string())
-}
-
-#[test]
-fn columns_of_any_csv_become_channels() {
-    let folder = tables(&[
-        ("mapping.toml", CSV),
-        (
-            "wheels.csv",
-            "turn_deg_s,stamp_ms,temperature,speed_kmh\n4,1700000000123.456789,20,3\n8,1700000001000,20,5\n",
-        ),
-    ]);
-    let (recording, report) = read_tables(folder.path()).expect("read");
-    assert_eq!(report.form, Form::Csv);
-    let odometry = &recording.robots[&RobotId(3)].odometry;
-    assert_eq!(odometry[0].time, Timestamp(1_700_000_000_123_456_789));
-    assert_eq!(odometry[0].reading, Reading::Velocity { forward_m_s: 1.5, yaw_rate_rad_s: 1.0 });
-    assert_eq!(odometry[1].reading, Reading::Velocity { forward_m_s: 2.5, yaw_rate_rad_s: 2.0 });
-    // The file itself can be named as well.
-    assert_eq!(read_tables(&folder.path().join("wheels.csv")).expect("read").0.robots, recording.robots);
-}
-
-#[test]
-fn a_csv_that_does_not_fit_is_refused_with_its_place() {
-    let refused = |mapping: &str, table: &str| {
-        read_tables(tables(&[("mapping.toml", mapping), ("wheels.csv", table)]).path()).expect_err("refused")
-    };
-    let header = "stamp_ms,speed_kmh,turn_deg_s\n";
-    let error = refused(CSV, &format!("{header}1,2,3\n1,2,x\n"));
-    assert!(
-        error.contains("wheels.csv:3: found `1,2,x`, expected a finite number in column `turn_deg_s`"),
-        "{error}"
-    );
-    let error = refused(CSV, &format!("{header}1e3,2,3\n"));
-    assert!(error.contains("expected a time in column `stamp_ms`, not `1e3`"), "{error}");
-    let error = refused(CSV, "stamp_ms,speed\n");
-    assert!(error.contains("`speed_kmh` is missing"), "{error}");
-    let error = refused(&CSV.replace("wheels.csv", "wheel.csv"), header);
-    assert!(error.contains("wheel.csv is missing") && error.contains("csv[1] (wheel.csv)"), "{error}");
-    let error = refused(&CSV.replace(", \"turn_deg_s\"", ""), header);
-    assert!(error.contains("found 2 names, expected those of the columns with t, v, w"), "{error}");
-    let error = refused(&CSV.replace("velocity", "relative"), header);
-    assert!(error.contains("write them as r1/relative.csv"), "{error}");
 }

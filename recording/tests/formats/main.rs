@@ -8,7 +8,9 @@
 )]
 
 mod bag;
+mod bag_refused;
 mod common;
+mod csv;
 mod folder;
 mod mcap;
 mod mrclam;

@@ -197,10 +197,15 @@ fn what_cannot_be_tuned_is_refused_with_what_to_do() {
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("blind.toml", noise.split("[sensors]").next().unwrap());
     write("joining.toml", &format!("[filter]\njoin = true\n{noise}"));
+    write(
+        "misnamed.toml",
+        &format!("[filter.clutter]\nshare = 0.02\nreach_m = 9.0\nmisnamed = 0.1\n{noise}"),
+    );
     write("calibrated.toml", &format!("{noise}[calibration]\nsigma_forward_scale = 0.01\n"));
     for (arguments, words) in [
         (&["--noise", "blind.toml"][..], &["no observation", "pleiad replay"][..]),
         (&["--noise", "joining.toml"], &["filter.join", "take it out"]),
+        (&["--noise", "misnamed.toml"], &["filter.clutter.misnamed", "take it out"]),
         (&["--noise", "calibrated.toml"], &["[calibration]", "take the table out"]),
         (&["--noise", "noise.toml", "--also", "sensors.bearing.sigma_rad"], &["sensors.bearing.sigma_rad"]),
         (

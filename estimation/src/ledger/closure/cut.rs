@@ -22,7 +22,7 @@ impl Ledger {
             .inspect(|(_, record)| counts.add(record))
             .map(|(key, record)| (*key, record.fact))
             .collect();
-        let others = |id, robot| self.naming.others.get(&(id, robot)).copied();
+        let others = |id, robot| self.other_half(id, robot);
         fold_on(&mut joint, &self.config, &closed, &others, &mut |_, _| {});
         let lost = self.pending.values().filter(|observation| observation.time <= cut).count();
         counts.expired += lost;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, bail};
 use pleiad_estimation::fact::{EntryId, NominalState, Quantity};
-use pleiad_estimation::fold::{Fact, FactKey, FoldConfig, Outcome, Residual, fold_on, nobody};
+use pleiad_estimation::fold::{Fact, FactKey, FoldConfig, Others, Outcome, Residual, fold_on};
 use pleiad_estimation::geometry::wrap_angle;
 use pleiad_estimation::joint::Joint;
 use pleiad_estimation::strategy::{Deviation, joint_of_replica};
@@ -74,14 +74,15 @@ pub fn play(world: &World, configs: &[FoldConfig], times_s: &[f64]) -> anyhow::R
     // The last odometry sample of a robot may be a little before the last time asked for.
     let last = reckoned.values().map(|own| own.trajectory.end().0).min().unwrap_or(end);
     let times: Vec<Timestamp> = times_s.iter().map(|time| begin.plus_seconds(*time).min(last)).collect();
-    let scores = configs.iter().map(|config| score(world, config, &facts, &reckoned, &times));
+    let others = |id, robot| ledger.other_half(id, robot);
+    let scores = configs.iter().map(|config| score(world, config, (&facts, &others), &reckoned, &times));
     Ok(Trial { facts: facts.len(), scores: scores.collect::<anyhow::Result<_>>()? })
 }
 
 fn score(
     world: &World,
     config: &FoldConfig,
-    facts: &[(FactKey, Fact)],
+    (facts, others): (&[(FactKey, Fact)], &Others<'_>),
     reckoned: &BTreeMap<RobotId, Reckoned>,
     times: &[Timestamp],
 ) -> anyhow::Result<Score> {
@@ -92,12 +93,12 @@ fn score(
         // What later facts would move must not be in it.
         let held = facts.partition_point(|(key, _)| key.time <= *time);
         let mut joint = Joint::new(config.form);
-        fold_on(&mut joint, config, &facts[..held], &nobody, &mut |_, _| {});
+        fold_on(&mut joint, config, &facts[..held], others, &mut |_, _| {});
         joints.push(joint);
     }
     score.seconds = begun.elapsed().as_secs_f64();
     let mut residuals: BTreeMap<EntryId, Residual> = BTreeMap::new();
-    fold_on(&mut Joint::new(config.form), config, facts, &nobody, &mut |key, residual| {
+    fold_on(&mut Joint::new(config.form), config, facts, others, &mut |key, residual| {
         residuals.insert(key.id, residual);
     });
     innovations(&mut score, facts, &residuals);

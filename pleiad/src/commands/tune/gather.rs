@@ -40,6 +40,12 @@ pub fn gather(team: &Team) -> anyhow::Result<Gathered> {
                  likelihoods would be of different readings; take it out of the noise, and put it back into what is found"
             );
         }
+        if agent.filter.clutter.is_some_and(|clutter| clutter.misnamed > 0.0) {
+            bail!(
+                "filter.clutter.misnamed (robot {robot}): likelihoods are of readings that are of what they name, or of nothing; \
+                 take it out of the noise, and put it back into what is found"
+            );
+        }
         if agent.calibration.is_some() {
             bail!(
                 "[calibration] (robot {robot}): noise levels are found with parameters known; take the table out of \
