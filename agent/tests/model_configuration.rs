@@ -28,7 +28,7 @@ fn written(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
 
 #[test]
 fn a_model_is_found_beside_the_configuration_that_names_it() {
-    let (folder, path) = written(&format!("team = 'blue'\nrobot = 1\nmodel = 'models/corrected.toml'\n"));
+    let (folder, path) = written("team = 'blue'\nrobot = 1\nmodel = 'models/corrected.toml'\n");
     std::fs::create_dir(folder.path().join("models")).unwrap();
     std::fs::write(folder.path().join("models/corrected.toml"), MODEL).unwrap();
     let node = AgentConfig::read(&path).unwrap().node().unwrap();

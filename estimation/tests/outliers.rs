@@ -6,11 +6,9 @@
 mod support;
 
 use pleiad_estimation::fold::{Clutter, FoldConfig, Relinearization};
-use pleiad_estimation::joint::Joint;
 use pleiad_estimation::ledger::Ledger;
 use pleiad_estimation::statistics::chi_square_interval;
-use pleiad_estimation::{RobotId, Timestamp};
-use support::wander::{Run, TICK_NS, World, Wrong, run};
+use support::wander::{World, Wrong, run};
 
 const RUNS: u64 = 60;
 

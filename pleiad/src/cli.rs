@@ -4,6 +4,7 @@ mod calibrate;
 mod evaluate;
 mod export;
 mod filter;
+mod reading;
 mod slam;
 mod survey;
 mod tune;
@@ -20,6 +21,7 @@ pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
 pub use evaluate::{EvaluateArgs, VariantArg, VariantFilter};
 pub use export::{ExportArgs, ExportForm};
 pub use filter::FilterArgs;
+pub use reading::ReadingArgs;
 pub use slam::{AssociationArg, MeasureArg, SlamArgs};
 pub use survey::SurveyArgs;
 pub use tune::{AlsoArg, TuneArgs};
@@ -167,12 +169,8 @@ pub struct ReplayArgs {
     /// Default: model.toml in the recording, if it is there.
     #[arg(long)]
     pub model: Option<PathBuf>,
-    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
-    #[arg(long, value_name = "FILE")]
-    pub mapping: Option<PathBuf>,
-    /// Leave out rows that cannot be read; they are counted and reported.
-    #[arg(long)]
-    pub skip_bad_rows: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Folder for the report and all data; a new one under runs/ if absent.
     #[arg(long)]
     pub out: Option<PathBuf>,
@@ -253,12 +251,8 @@ pub struct DiagnoseArgs {
     /// Effects of the catalogue that are not tried, as in lateral_skid,crab: what is said of them without a name.
     #[arg(long, value_name = "EFFECT,...", value_delimiter = ',')]
     pub without: Vec<String>,
-    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
-    #[arg(long, value_name = "FILE")]
-    pub mapping: Option<PathBuf>,
-    /// Leave out rows that cannot be read; they are counted and reported.
-    #[arg(long)]
-    pub skip_bad_rows: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Folder for report.html, findings.json and corrected.toml; a new one under runs/ if absent.
     #[arg(long)]
     pub out: Option<PathBuf>,

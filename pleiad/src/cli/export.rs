@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::ReadingArgs;
+
 #[derive(Debug, Args)]
 pub struct ExportArgs {
     /// A recording folder, a run folder, an MRCLAM folder, an .mcap file, or a ROS 2 bag or .csv files with a mapping.
@@ -11,12 +13,8 @@ pub struct ExportArgs {
     /// The form to write.
     #[arg(long, value_enum)]
     pub to: ExportForm,
-    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
-    #[arg(long, value_name = "FILE")]
-    pub mapping: Option<PathBuf>,
-    /// Leave out rows that cannot be read; they are counted and reported.
-    #[arg(long)]
-    pub skip_bad_rows: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Folder to write, a new one under runs/ if absent; for mcap the file, the recording's name if absent.
     #[arg(long)]
     pub out: Option<PathBuf>,

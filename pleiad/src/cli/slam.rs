@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::ErrorArg;
+use super::{ErrorArg, ReadingArgs};
 
 #[derive(Debug, Args)]
 pub struct SlamArgs {
@@ -37,12 +37,8 @@ pub struct SlamArgs {
     /// Noise and geometry of the robots of a recording, as for `pleiad replay`.
     #[arg(long)]
     pub noise: Option<PathBuf>,
-    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
-    #[arg(long, value_name = "FILE")]
-    pub mapping: Option<PathBuf>,
-    /// Leave out rows of a recording that cannot be read; they are counted and reported.
-    #[arg(long)]
-    pub skip_bad_rows: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Folder for the report and the numbers; a new one under runs/ if absent.
     #[arg(long)]
     pub out: Option<PathBuf>,

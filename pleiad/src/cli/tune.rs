@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use pleiad_estimation::likelihood::Level;
 
-use super::LandmarksArg;
+use super::{LandmarksArg, ReadingArgs};
 use crate::levels;
 
 #[derive(Debug, Args)]
@@ -35,12 +35,8 @@ pub struct TuneArgs {
     /// keys as in motion.yaw_rad_per_sqrt_rad,sensors.range_bearing.sigma_range_per_m.
     #[arg(long, default_value = "auto")]
     pub also: AlsoArg,
-    /// What is what in a ROS 2 bag or in .csv files (docs/interchange.md). Default: mapping.toml beside them.
-    #[arg(long, value_name = "FILE")]
-    pub mapping: Option<PathBuf>,
-    /// Leave out rows that cannot be read; they are counted and reported.
-    #[arg(long)]
-    pub skip_bad_rows: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// File for the noise found, which `replay --noise` and agents read, with [filter.clutter] if there was garbage; of
     /// robots whose geometry differs, a file for each: NAME-rN.toml for robot N. Printed in any case.
     #[arg(long, value_name = "FILE")]

@@ -30,7 +30,7 @@ struct ExportJson {
 }
 
 pub fn run(args: &ExportArgs) -> anyhow::Result<()> {
-    let input = setup::open(&args.recording, args.mapping.as_deref(), args.skip_bad_rows)?;
+    let input = setup::open(&args.recording, args.reading.mapping.as_deref(), args.reading.skip_bad_rows)?;
     let estimates = estimates(&args.recording, &input)?;
     let mut files = Vec::new();
     let out = match args.to {

@@ -90,7 +90,7 @@ pub struct SecondsJson {
 }
 
 pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
-    let input = setup::open(&args.recording, args.mapping.as_deref(), args.skip_bad_rows)?;
+    let input = setup::open(&args.recording, args.reading.mapping.as_deref(), args.reading.skip_bad_rows)?;
     let Input { recording, ingest, folder, .. } = &input;
     let options = ReplayOptions {
         filter: args.filter.clone(),

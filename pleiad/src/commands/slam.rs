@@ -59,7 +59,7 @@ fn of_scenario(args: &SlamArgs, options: RunOptions) -> anyhow::Result<SlamPage>
 }
 
 fn of_recording(args: &SlamArgs, options: &RunOptions) -> anyhow::Result<SlamPage> {
-    let input = setup::open(&args.input, args.mapping.as_deref(), args.skip_bad_rows)?;
+    let input = setup::open(&args.input, args.reading.mapping.as_deref(), args.reading.skip_bad_rows)?;
     let Input { recording, ingest, folder, .. } = &input;
     let team = setup::recorded(
         recording,

@@ -30,8 +30,15 @@ pub fn run(args: &DiagnoseArgs) -> anyhow::Result<()> {
     let mut recordings = Vec::new();
     for (name, path) in &chosen.recordings {
         spinner.set_message(format!("reading {name}"));
-        let mapping = args.mapping.as_deref();
-        recordings.push(read(name, path, mapping, args.skip_bad_rows, model.as_ref(), &mut chosen.notes)?);
+        let mapping = args.reading.mapping.as_deref();
+        recordings.push(read(
+            name,
+            path,
+            mapping,
+            args.reading.skip_bad_rows,
+            model.as_ref(),
+            &mut chosen.notes,
+        )?);
     }
     // A folder that cannot be written to is told before the work, a new one is made after it.
     let asked = args.out.as_deref().map(|out| folder::create(Some(out), "")).transpose()?;

@@ -19,7 +19,7 @@ const BEGINNING: f64 = 0.03;
 
 pub fn run(args: &TuneArgs) -> anyhow::Result<()> {
     let began = Instant::now();
-    let input = setup::open(&args.recording, args.mapping.as_deref(), args.skip_bad_rows)?;
+    let input = setup::open(&args.recording, args.reading.mapping.as_deref(), args.reading.skip_bad_rows)?;
     let Input { recording, ingest, folder, .. } = &input;
     let options = ReplayOptions {
         filter: FilterArgs::exact(ErrorArg::Invariant),
