@@ -1,6 +1,7 @@
 //! The command line, as clap sees it.
 
 mod calibrate;
+mod concealed;
 mod evaluate;
 mod export;
 mod filter;
@@ -9,15 +10,16 @@ mod slam;
 mod survey;
 mod tune;
 mod values;
+mod why;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use pleiad_benchmark::Asked;
 use pleiad_estimation::strategy::StrategyKind;
 use pleiad_sim_peers::scenario::ManoeuvreKind;
 
 pub use calibrate::{Calibrate, MapArgs, UmbmarkArgs};
+pub use concealed::{Benchmark, ConcealedArgs};
 pub use evaluate::{EvaluateArgs, VariantArg, VariantFilter};
 pub use export::{ExportArgs, ExportForm};
 pub use filter::FilterArgs;
@@ -28,10 +30,20 @@ pub use tune::{AlsoArg, TuneArgs};
 pub use values::{
     AbsoluteArg, CalibrateArg, ClutterArg, InflateArg, LandmarksArg, QuarantineArg, RelinearizeArg, ToldArg,
 };
+pub use why::WhyArgs;
+
+const AFTER: &str = "\
+Examples:
+  pleiad demo --seconds 120 --out demo
+  pleiad init team.toml
+  pleiad run team.toml --out run
+
+Exit codes: 0 done, 1 failed (stderr says why), 2 wrong usage.
+Logs go to stderr; PLEIAD_LOG=info shows more. NO_COLOR is respected.";
 
 /// A team of robots localized as one distributed Kalman filter over a message bus.
 #[derive(Debug, Parser)]
-#[command(name = "pleiad", version, after_help = "Logs go to stderr; PLEIAD_LOG=info shows more.")]
+#[command(name = "pleiad", version, after_help = AFTER)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
@@ -40,18 +52,41 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// The observability demonstration: the same team without and with one GPS receiver.
+    #[command(after_help = "Examples:\n  pleiad demo --seconds 120 --robots 3 --out demo")]
     Demo(DemoArgs),
+    /// A scenario to begin with, with comments.
+    #[command(after_help = "Examples:\n  pleiad init team.toml")]
+    Init(InitArgs),
     /// Run a scenario: simulated robots, one agent process each.
+    #[command(
+        after_help = "Examples:\n  pleiad run team.toml --out run\n  pleiad run team.toml --seed 7 --strategy pairwise --out approximate --json"
+    )]
     Run(RunArgs),
     /// Replay a recording through the agents of a team.
+    #[command(
+        after_help = "Examples:\n  pleiad replay run --out again\n  pleiad replay recording --absolute 2@1.0:0.3 --seconds 30 --out fixes"
+    )]
     Replay(ReplayArgs),
+    /// Why observations of a recording were not used.
+    #[command(
+        after_help = "Examples:\n  pleiad why run\n  pleiad why run --robot 2 --at 30 --within 5 --json"
+    )]
+    Why(WhyArgs),
     /// Noise levels from a recording, without its ground truth: those under which its innovations are likeliest.
+    #[command(after_help = "Examples:\n  pleiad tune recording --out noise.toml")]
     Tune(TuneArgs),
     /// What a scenario or a recording lets the team know of itself.
+    #[command(
+        after_help = "Examples:\n  pleiad observability team.toml\n  pleiad observability recording --seconds 20 --json"
+    )]
     Observability(ObservabilityArgs),
     /// A recording of a scenario; or what the nominal model predicts of one, and what was measured instead.
+    #[command(after_help = "Examples:\n  pleiad simulate team.toml --out recording")]
     Simulate(SimulateArgs),
     /// A recording, and the estimates in a run, for other tools: csv, TUM, MCAP.
+    #[command(
+        after_help = "Examples:\n  pleiad export run --to tum --out tum\n  pleiad export run --to mcap --out run.mcap"
+    )]
     Export(ExportArgs),
     /// What physics the nominal model leaves out: where, what, how sure, and the corrected model.
     Diagnose(DiagnoseArgs),
@@ -59,8 +94,14 @@ pub enum Command {
     #[command(subcommand)]
     Benchmark(Benchmark),
     /// What loss and partitions do to each strategy: the table of strategies by fault level.
+    #[command(
+        after_help = "Examples:\n  pleiad faults team.toml --strategies exact,naive --loss 50 --burst 1 --seeds 1 --out faults"
+    )]
     Faults(FaultsArgs),
     /// Whether the filter is as good as it says, over many runs of a scenario, beside variants of it.
+    #[command(
+        after_help = "Examples:\n  pleiad evaluate team.toml --seeds 4 --seconds 30 --variants additive,invariant --out evaluated"
+    )]
     Evaluate(EvaluateArgs),
     /// The systems that the joint filter grew from, each as a study with its claims: Kalman filter, gyro, rover and others.
     Survey(SurveyArgs),
@@ -70,6 +111,7 @@ pub enum Command {
     #[command(subcommand)]
     Calibrate(Calibrate),
     /// The physics a simulation can leave out: names, parameters, equations.
+    #[command(after_help = "Examples:\n  pleiad effects\n  pleiad effects longitudinal_slip")]
     Effects(EffectsArgs),
     /// One robot's agent.
     Agent(AgentArgs),
@@ -81,6 +123,7 @@ pub enum Command {
     #[command(name = "sim-peers")]
     SimPeers(SimPeersArgs),
     /// Shell completions.
+    #[command(after_help = "Examples:\n  pleiad completions bash")]
     Completions {
         /// For which shell.
         shell: clap_complete::Shell,
@@ -107,6 +150,13 @@ pub struct DemoArgs {
     /// One JSON object on stdout.
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct InitArgs {
+    /// File to write; one that exists is not overwritten.
+    #[arg(default_value = "team.toml")]
+    pub file: PathBuf,
 }
 
 #[derive(Debug, Args)]
@@ -257,46 +307,6 @@ pub struct DiagnoseArgs {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// The object of findings.json on stdout.
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[derive(Debug, Subcommand)]
-pub enum Benchmark {
-    /// The diagnosis on data in which something is concealed: named, missed, invented; beside other methods.
-    Concealed(ConcealedArgs),
-}
-
-#[allow(clippy::struct_excessive_bools, reason = "switches of the command line")]
-#[derive(Debug, Args)]
-pub struct ConcealedArgs {
-    /// How many seeds: recordings of every case of a class.
-    #[arg(long, default_value_t = 1)]
-    pub seeds: u64,
-    /// The first seed.
-    #[arg(long, default_value_t = 1)]
-    pub first_seed: u64,
-    /// Which classes: clean, single, masked, absorbed, cancelling, buried, rare, out_of_catalogue,
-    /// unidentifiable, decoy; with a number of seeds of its own as in clean:100. Default: all.
-    #[arg(long, value_name = "CLASS", num_args = 1.., value_delimiter = ',')]
-    pub class: Vec<Asked>,
-    /// Only cases with one of these in their names, as in single/crab/x1/white/1.
-    #[arg(long, value_name = "TEXT", num_args = 1..)]
-    pub only: Vec<String>,
-    /// Also diagnose without something: no_blocks of time, no_scans for places and onsets, no_sets, no_truth, no_landmarks
-    /// (and no truth). All if none is named.
-    #[arg(long, value_name = "NAME", num_args = 0.., value_delimiter = ',')]
-    pub ablations: Option<Vec<String>>,
-    /// Leave away the other methods: sparse regression, lasso, joint fit.
-    #[arg(long)]
-    pub no_baselines: bool,
-    /// Take up a run that stopped, in the folder of --out; cases that have a result are not run again.
-    #[arg(long, requires = "out")]
-    pub resume: bool,
-    /// Folder for the sealed answers, the results, summary.json and concealed.md; a new one under runs/ if absent.
-    #[arg(long)]
-    pub out: Option<PathBuf>,
-    /// One JSON object on stdout.
     #[arg(long)]
     pub json: bool,
 }

@@ -22,7 +22,7 @@ fn main() -> ExitCode {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(std::io::stderr().is_terminal() && !output::colours_are_unwanted())
         .init();
     match commands::run(cli.command) {
         Ok(()) => ExitCode::SUCCESS,

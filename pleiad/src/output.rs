@@ -32,6 +32,11 @@ pub fn error(error: &anyhow::Error) {
     }
 }
 
+/// Whether `NO_COLOR` is set to something (<https://no-color.org>).
+pub fn colours_are_unwanted() -> bool {
+    std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty())
+}
+
 /// What is being done, on stderr; nothing where stderr is no terminal.
 pub fn spinner(message: &str) -> ProgressBar {
     let spinner = ProgressBar::new_spinner();

@@ -12,6 +12,8 @@ mod demo;
 mod errors;
 #[path = "command_line/evaluate.rs"]
 mod evaluate;
+#[path = "command_line/examples.rs"]
+mod examples;
 #[path = "command_line/found.rs"]
 mod found;
 #[path = "command_line/help.rs"]
@@ -30,6 +32,8 @@ mod simulate;
 mod standing;
 #[path = "command_line/tune.rs"]
 mod tune;
+#[path = "command_line/why.rs"]
+mod why;
 
 use std::path::Path;
 

@@ -11,6 +11,7 @@ mod evaluate;
 mod evict;
 mod export;
 mod faults;
+mod init;
 mod observability;
 mod replay;
 mod run;
@@ -22,6 +23,7 @@ mod slam;
 mod study;
 mod survey;
 mod tune;
+mod why;
 mod worlds;
 
 pub use runner::{Survived, with_samples};
@@ -32,8 +34,10 @@ use crate::cli::{Benchmark, Command};
 pub fn run(command: Command) -> anyhow::Result<()> {
     match command {
         Command::Demo(args) => demo::run(&args),
+        Command::Init(args) => init::run(&args),
         Command::Run(args) => run::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Why(args) => why::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Observability(args) => observability::run(&args),
         Command::Simulate(args) => simulate::run(&args),

@@ -2,8 +2,10 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 20] = [
     "demo",
+    "init",
+    "why",
     "run",
     "replay",
     "tune",
