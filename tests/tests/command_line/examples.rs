@@ -2,13 +2,15 @@
 
 use pleiad_tests::program::{run, turn};
 
+use super::help::COMMANDS;
+
 const HELPS: [&[&str]; 14] = [
     &[],
     &["init"],
     &["demo"],
-    &["observability"],
     &["run"],
     &["simulate"],
+    &["observability"],
     &["replay"],
     &["tune"],
     &["why"],
@@ -48,6 +50,15 @@ fn the_examples_of_the_help_run_as_printed() {
             run(folder.path(), example.split(' ')).success();
             assert!(made.is_none_or(|made| made.exists()), "{example} left nothing");
         }
+    }
+}
+
+#[test]
+fn no_help_has_examples_that_are_not_run() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in COMMANDS {
+        let help = run(folder.path(), [command, "--help"]).success();
+        assert_eq!(help.contains("Examples:"), HELPS.contains(&[command].as_slice()), "{command}");
     }
 }
 

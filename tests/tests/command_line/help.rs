@@ -2,7 +2,7 @@
 
 use pleiad_tests::program::run;
 
-const COMMANDS: [&str; 20] = [
+pub const COMMANDS: [&str; 20] = [
     "demo",
     "init",
     "why",

@@ -55,7 +55,7 @@ fn a_wrong_range_is_refused_by_the_gate_and_found_by_robot_and_time() {
     assert!(clean["observations"].as_u64().unwrap() >= 50, "{clean}");
 
     // Ten metres too far: the eleventh sighting of robot 1.
-    let file = recording.join("robots").join("r1").join("relative.csv");
+    let file = recording.join("r1").join("relative.csv");
     edit(&file, |header, row, cells| {
         let range = header.iter().position(|name| name.contains("range")).unwrap();
         if row == 10 {
